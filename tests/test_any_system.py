@@ -108,7 +108,7 @@ REFUSED |= {(of, name): "system: .*elastic-slip" for of in SLIPPING for name in 
 # the case of the arm, its joint: of other systems 'identify'
 REFUSED |= {("identify_joint", name): "system: k_t must be the stiffness of an end" for name in (*NAMES, *TURNING)}
 # what is said of natural modes: 'eigenvalues' and the like tell of complex ones
-NATURAL = ("natural_frequencies", "mode_shapes", "modal_parameters", "forced_width", "sweep")
+NATURAL = ("natural_frequencies", "mode_shapes", "modal_parameters", "sweep")
 REFUSED |= {(of, name): "no natural modes, .*system.conservative_part" for of in NATURAL for name in TURNING}
 PIPE, SHAFT = TURNING
 REFUSED |= {("slow_flow_values", name): "gyroscopic terms .*use steady_states" for name in TURNING}

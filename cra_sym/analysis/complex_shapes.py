@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.model.complex_shapes import CoarseIntegrationError, ComplexShapes
+from cra_sym.model.projection import project
 from cra_sym.model.routes import mode_sign, overview_places
 from cra_sym.model.system import System
 from cra_sym.model.values import flat_columns
+from cra_sym.model.vanishing import check_forces
 from cra_sym.solvers.lowest_motions import BasisModes, LowestMotions, lowest_motions
 from cra_sym.solvers.pencil import GeneralContinuum
 
-__all__ = ["of_complex_modes"]
+__all__ = ["of_complex_modes", "resonant_growth"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -49,6 +51,39 @@ def of_complex_modes(system: System, s: Complex, quantity: Callable[[System, Any
         basis, own = _on_basis(system, column[:, None], values)
         found.append(np.tensordot(own, quantity(one, basis), axes=1))
     return np.array(found, dtype=complex).reshape(*s.shape, *found[0].shape[1:])
+
+
+def resonant_growth(system: System, motion: str, s: Complex, tip: Callable[[System, Any], Array]) -> Array:
+    """Return how fast an output grows when a motion of unit amplitude is in resonance, shape (..., modes).
+
+    Driven with the frequency Im s, a mode has the amplitude ``growth (exp(Re s t) - 1) / Re s``, or ``growth t``.
+
+    Parameters
+    ----------
+    system : System
+        With a stress basis.
+    motion : str
+        Name of a prescribed motion.
+    s : ndarray of complex, shape (..., modes)
+        Eigenvalues of the modes, some of the lowest, each apart from all others.
+    tip : callable
+        ``tip(system, basis)`` returns the output in every coordinate of a basis.
+    """
+    pencil, loads = system.numerics("pencil"), system.numerics("loads", motion)
+    for load in loads.values():
+        check_forces(system, load, pencil)
+    columns, found = flat_columns(system.parameters, system.shape), np.empty(s.shape)
+    for row, column, values in zip(found.reshape(-1, s.shape[-1]), columns.T, s.reshape(-1, s.shape[-1]), strict=True):
+        one = system.model.at(dict(zip(system.numerics("names"), column, strict=True)))
+        ((_, problem),) = pencil.problems(column[:, None])
+        motions = _motions(problem, values)
+        all_values, vectors = np.linalg.eig(motions.system)
+        number = [np.abs(all_values - value).argmin() for value in values]
+        seen = (tip(one, motions.basis) @ motions.shapes @ vectors)[number]
+        forces = sum(np.outer((1j * values.imag) ** order, project(one.domain, motions.basis, load))
+                     for order, load in loads.items())  # fmt: skip
+        row[:] = np.abs(seen * ((np.linalg.inv(vectors) @ motions.push)[number] * forces).sum(axis=1))
+    return found
 
 
 def _on_basis(system: System, column: Array, s: Complex) -> tuple[BasisModes, Complex]:

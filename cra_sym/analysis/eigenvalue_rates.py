@@ -12,7 +12,7 @@ from cra_sym.analysis.differences import offsets_at, own_stiffness, room_of, wei
 from cra_sym.analysis.eigenvalues import eigenvalues
 from cra_sym.model.system import System
 
-__all__ = ["eigenvalue_rates", "mode_rates", "with_next"]
+__all__ = ["eigenvalue_rates", "gaps", "mode_rates", "with_next"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -90,7 +90,7 @@ def _rates(
 ) -> Complex:
     fixed = np.isinf(place)
     place = np.where(fixed, 1.0, place)
-    gap, slope, here = _gaps(s), np.zeros_like(s), quantity(system, s)
+    gap, slope, here = gaps(s), np.zeros_like(s), quantity(system, s)
     more = (None,) * (here.ndim - place.ndim)
     repeated = (gap <= _SAME * np.abs(s))[(..., *more[1:])]
     if repeated.all() and repeated.size:
@@ -144,7 +144,7 @@ def _approach(s: Complex, moved: Complex) -> Array:
     return np.asarray(np.maximum(by_pairs, np.abs(change / s).max(axis=-1)))
 
 
-def _gaps(s: Complex) -> Array:
+def gaps(s: Complex) -> Array:
     """Return the distance of every eigenvalue from the nearest other one, conjugates included, shape (..., modes)."""
     apart = np.abs(s[..., :, None] - np.concatenate([s, s.conj()], axis=-1)[..., None, :])
     modes = np.arange(s.shape[-1])

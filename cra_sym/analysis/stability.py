@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from cra_sym import checks
+from cra_sym.analysis.complex_shapes import resonant_growth
+from cra_sym.analysis.eigenvalue_rates import gaps, with_next
 from cra_sym.analysis.floquet import batch_shape, matrices_of, parametric
-from cra_sym.analysis.modes import participation
+from cra_sym.analysis.modes import displaced, only_motion, participation
 from cra_sym.analysis.zones import Zone, derived, first_order_zone, zone_of
 from cra_sym.kernels import derived_kernel
 from cra_sym.model.excitations import Excitation, Fluctuation, Parametric, TransverseBase
@@ -20,6 +22,8 @@ from cra_sym.si import Numbers, paired
 __all__ = ["AsymptoticWarning", "ResonanceWarning", "forced_width", "judged_boundary", "stability_boundary"]
 
 _FORCED = derived_kernel("cra_sym.mechanics.boundaries:forced_growth")
+_GROWING, _LIGHT = 1e-9, 0.1  # real parts of eigenvalues over their moduli: rounding, and light damping
+_SAME = 1e-9  # relative distance below which eigenvalues are equal
 _REACH = 0.5  # largest second-order shift of the zone over its half-width
 
 
@@ -166,10 +170,15 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
     natural frequency makes the undamped tip amplitude grow linearly in time, at this rate for epsilon = 1. The measure
     does not depend on the normalisation of the modes.
 
+    Without natural modes (gyroscopic terms, forces that follow the motion), and with a base that acts by its
+    displacement or velocity too, resonances are those of the complex modes, at ``Im s`` of :func:`cra_sym.eigenvalues`,
+    and dampers count. The measure is the rate at the start: of a mode that decays, the amplitude grows as
+    ``(1 - exp(Re s t)) / |Re s|`` times the rate, not as t.
+
     Parameters
     ----------
     system : System
-        Its damping does not matter.
+        The damping of natural modes does not matter, and modal damping (zeta) does not at all.
     excitation : TransverseBase
         Its amplitude is w_1.
     modes : int
@@ -178,13 +187,15 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
     Returns
     -------
     ndarray, shape (..., modes)
-        m/s; ``...`` is broadcast from system and excitation.
+        m/s; ``...`` is broadcast from system and excitation. It is nan for complex modes of equal eigenvalues, which
+        are not determined one by one.
 
     Raises
     ------
     TypeError, ValueError
         If ``system`` is not a :class:`System`, ``excitation`` not a :class:`TransverseBase`, ``modes`` not an
-        integer from 1 to 1000, or shapes do not broadcast together.
+        integer from 1 to 1000, or shapes do not broadcast together; if a complex mode grows by itself, or decays by
+        more than a tenth of its frequency.
 
     Examples
     --------
@@ -200,9 +211,33 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
     checks.broadcastable(system=np.empty(system.shape), amplitude=np.empty(excitation.shape))
     modes = checks.count("modes", modes, high=MOST_MODES)
     amplitude = np.asarray(excitation.amplitude)[..., None]
+    acts_by_more = any(kind == "support" for _, kind in system.numerics("causes"))
+    if acts_by_more or system.conservative_part is not system:
+        return np.asarray(amplitude * _complex_growth(system, only_motion(system, support=acts_by_more), modes))
     tip = system.modes(modes).displacement(1, 0)
     width: np.ndarray = _FORCED(system.natural_frequencies(modes), participation(system, modes), tip, 1.0, amplitude)
     return width
+
+
+def _complex_growth(system: System, motion: str, modes: int) -> np.ndarray:
+    """Return how fast the tip grows in resonance with a motion of unit amplitude, 1/s, shape (..., modes)."""
+    if system.numerics("pencil") is None:
+        raise ValueError("system: with a field that has no derivative by x there are no complex modes; eliminate it")
+    s = with_next(system, modes)
+    apart, s = gaps(s)[..., :modes], s[..., :modes]
+    decays = f"decays by more than {_LIGHT:g} of its frequency, so that its resonance does not grow"
+    for bad, what in (
+        (s.real > _GROWING * np.abs(s), "grows by itself, so that no resonance shows; see eigenvalues"),
+        (-s.real > _LIGHT * np.abs(s), f"{decays}; use frequency_response"),
+    ):
+        if bad.any():
+            number = int(np.nonzero(bad)[-1].min()) + 1
+            raise ValueError(f"system: mode {number} {what}")
+    if not s.any():
+        return np.zeros(s.shape)
+    moving = np.where(s == 0.0, s[..., -1:], s)
+    found = resonant_growth(system, motion, moving, lambda one, basis: displaced(one, basis, 0))
+    return np.where(s == 0.0, 0.0, np.where(apart <= _SAME * np.abs(s), np.nan, found))
 
 
 def _resonance(resonance: Any, modes: int) -> tuple[int, int]:
