@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 __all__ = ["state_space"]
 
 Array = NDArray[np.float64]
+_OWN = 1e-10  # least share of its mass that a free motion has beside the modes: 1e-16 over it is the relative error
 
 
 @default_floating_point
@@ -52,13 +53,13 @@ def state_space(
         acts on: a coordinate, a field or slope at any place such as ``v.subs(x, L/2)``, or a sum of them.
     outputs : sequence, or mapping of names to them, optional
         Names: of a field (at the right end), a coordinate, a prescribed motion; 'y', 'tip_velocity' and
-        'tip_acceleration' of the first field there in the inertial frame, prescribed motions included; 'root_force',
-        'root_moment', 'tip_force' and 'tip_moment', the forces and moments that the structure exerts on its supports,
-        for springs k_t v(0, t) and k_r v_x(0, t) (of another field u 'root_force_u'); of an arm 'strain', that of
-        bending on the face turned to -v, h v_xx / 2, at the root. A pair ``('v', 0.3)`` or ``('strain', 0.3)`` takes a
-        field or the strain at another place, m. Expressions linear in fields at places, coordinates, motions and their
-        derivatives, of time up to the second, are outputs too, with parameters of the model as factors. Default: the
-        first field.
+        'tip_acceleration' of the first field there in the inertial frame, with the prescribed motions and the
+        coordinates that carry all of it, as of a gantry; 'root_force', 'root_moment', 'tip_force' and 'tip_moment',
+        the forces and moments that the structure exerts on its supports, for springs k_t v(0, t) and k_r v_x(0, t) (of
+        another field u 'root_force_u'); of an arm 'strain', that of bending on the face turned to -v, h v_xx / 2, at
+        the root. A pair ``('v', 0.3)`` or ``('strain', 0.3)`` takes a field or the strain at another place, m.
+        Expressions linear in fields at places, coordinates, motions and their derivatives, of time up to the second,
+        are outputs too, with parameters of the model as factors. Default: the first field.
 
     Returns
     -------
@@ -72,9 +73,9 @@ def state_space(
     ------
     TypeError, ValueError
         If ``system`` is not a :class:`System` or is a batch, its model does not have the motion, ``modes`` is not an
-        integer from 1 to 1000, or an input or output is not one of the above. Complex modes have no
-        'drive_force' and no forces at the ends: make the motion a coordinate that a force F(t) drives, and name the
-        force of a spring as an expression such as ``k*v.subs(x, 0)``.
+        integer from 1 to 1000, an input or output is not one of the above, or the inertia of a free motion is all
+        that of the modes. Complex modes have no 'drive_force' and no forces at the ends: make the motion a coordinate
+        that a force F(t) drives, and name the force of a spring as an expression such as ``k*v.subs(x, 0)``.
 
     Notes
     -----
@@ -175,11 +176,22 @@ def _equations(
         own = system.numerics("carried", states[0]).function(*system.domain.values)
         mass[0, 0], damping[0, 0], stiffness[0, 0] = (float(value) for value in own)
         mass[0, 1:] = mass[1:, 0] = participation(system, modes, states[0])
+        _check_inertia(states[0], mass[0, 0], mass[0, 1:])
     for order, column, load in _support_loads(system, states, driven):
         (stiffness, damping)[order][first:, column] = -system.project(load, modes)
     push = np.stack([_push(system, modes, states, one, free=free) for one in driven], axis=-1)
     found = np.asarray(np.linalg.solve(mass, np.hstack([-stiffness, -damping, push])), dtype=np.float64)
     return found[:, : 2 * size], found[:, 2 * size :]
+
+
+def _check_inertia(name: str, mass: float, shared: Array) -> None:
+    """Raise if all inertia of a free motion is that of the modes, so that rounding would decide on its acceleration."""
+    own = mass - float(shared @ shared)
+    if not own > _OWN * mass:
+        raise ValueError(
+            f"input: {FREE!r}: {name} has no mass of its own beside that of {len(shared)} modes ({max(own, 0.0):.1g} of "
+            f"{mass:.4g}), which must be above {_OWN:g} of it; give {name} a mass, or take fewer modes"
+        )
 
 
 def _support_loads(

@@ -143,4 +143,6 @@ def pushed(model: Model, drive: Expr) -> tuple[Model, str, Kernel] | None:
         raise ValueError(f"drive = {shown(drive)}: what a force acts on at {place} must be one of {known}")
     force = Function("unit_force")(model.equations.t)
     inside = [*model.pieces["inside"], (place, force * displacement)]
-    return model.replace(inside=inside), force.func.__name__, kernel(place, model.symbols, backend="numpy")
+    found = model.replace(inside=inside)
+    found.symbols = model.symbols  # those of oscillating terms too, which take values all the same
+    return found, force.func.__name__, kernel(place, model.symbols, backend="numpy")

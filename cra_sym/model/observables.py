@@ -86,7 +86,8 @@ def named_sums(model: Model) -> dict[str, Sum]:
     """Return the named measurable quantities of a model.
 
     Fields at the right end, coordinates and prescribed motions by their names; 'y', the first field there in the
-    inertial frame, and its rates; and the forces that the structure exerts through its ends.
+    inertial frame, with the motions and coordinates that carry it, and its rates; and the forces that the structure
+    exerts through its ends.
     """
     equations, t = model.equations, model.equations.t
     right = equations.domain[1]
@@ -118,8 +119,20 @@ def _forces(model: Model) -> dict[str, Sum]:
 
 
 def frame(model: Model) -> Expr:
-    """Return the rigid-body displacement of the right end of the first field due to the prescribed motions."""
-    total = S.Zero
+    """Return the rigid-body displacement of the right end of the first field.
+
+    It is due to the prescribed motions, and to coordinates that carry the whole field: its kinetic energy per length
+    is then a square, such as rho A (v_t + x q_t)^2 / 2.
+    """
+    x, right = model.equations.x, model.equations.domain[1]
+    total, steady = S.Zero, weak_form(model.linearised.variation)
+    for number, coordinate in enumerate(steady.variation.space.unknowns):
+        own, carried = Jet(0, 0, 0, None), Jet(number, 0, 0, None)
+        mass, shared, alone = (
+            steady.inside.get(pair, {}).get(2, S.Zero) for pair in ((own, own), (own, carried), (carried, carried))
+        )
+        if coordinate in model.equations.coordinates and shared != 0 and cancel(shared**2 - mass * alone) == 0:
+            total += cancel(shared / mass).subs(x, right) * coordinate
     for motion in model.motions:
         freed = weak_form(model.freed(motion.func.__name__).linearised.variation)
         space, field = freed.variation.space, Jet(0, 0, 0, None)

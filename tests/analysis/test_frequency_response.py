@@ -171,3 +171,18 @@ def test_a_force_at_an_interior_place_is_reciprocal_and_static():
 def test_what_does_not_drive_is_named(drive, kind, words):
     with pytest.raises(ValueError, match=words):
         cra.frequency_response(Arm.nominal(), 1.0, drive=drive, kind=kind)
+
+
+def test_a_force_inside_beside_terms_that_oscillate():
+    """It was refused where a parameter is in the oscillating terms alone; the static deflection has a closed form."""
+    EI, rho, k, b, epsilon, varpi = sp.symbols("EI rho k b epsilon varpi")
+    model = cra.Model(
+        rho * v.diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2, fields=[v], x=x, domain=(0, L), t=t,
+        essential=[v.subs(x, 0), v.diff(x).subs(x, 0)], small=(epsilon, varpi),
+        right=-k * v**2 / 2 - b * epsilon * sp.cos(varpi * t) * v**2 / 2,
+    )  # fmt: skip
+    system = model.at({EI: 5.0, rho: 0.4, k: 30.0, b: 7.0, L: 1.0})
+    place = 0.6
+    alone = place**2 * (3 - place) / 6 / 5.0  # a unit force on the cantilever moves its tip by that
+    found = cra.frequency_response(system, 0.0, drive=v.subs(x, place))
+    assert found == pytest.approx(alone / (1 + 30.0 / (3 * 5.0)), rel=1e-12)
