@@ -189,8 +189,8 @@ def _check_inertia(name: str, mass: float, shared: Array) -> None:
     own = mass - float(shared @ shared)
     if not own > _OWN * mass:
         raise ValueError(
-            f"input: {FREE!r}: {name} has no mass of its own beside that of {len(shared)} modes ({max(own, 0.0):.1g} of "
-            f"{mass:.4g}), which must be above {_OWN:g} of it; give {name} a mass, or take fewer modes"
+            f"input: {FREE!r}: {name} has no mass of its own beside that of {len(shared)} modes ({max(own, 0.0):.1g} "
+            f"of {mass:.4g}), which must be above {_OWN:g} of it; give {name} a mass, or take fewer modes"
         )
 
 
