@@ -10,7 +10,7 @@ formulas would be too long.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
 from typing import TYPE_CHECKING
@@ -22,16 +22,17 @@ from cra_sym.cached import cached_property
 from cra_sym.kernels import Kernel, compiled, kernel
 from cra_sym.kernels.parts import Parts, in_parts, wants_compiler
 from cra_sym.kernels.plain import functions_of
+from cra_sym.model.coefficient_rates import CoefficientRates
 from cra_sym.model.routes import GeneralRoute, StateModes, Values
 from cra_sym.model.spatial import SpatialProblem
 from cra_sym.model.values import flat_columns
 from cra_sym.solvers.waves import (
     QUICK,
+    Counts,
     Functions,
     Search,
     Structure,
     UniformProblem,
-    determinant,
     formulas,
     lowest_waves,
     template,
@@ -40,11 +41,11 @@ from cra_sym.solvers.waves_count import Determinant
 from cra_sym.solvers.waves_modes import wave_states
 from cra_sym.solvers.waves_rates import (
     Slopes,
-    compiled_slopes,
+    compiled_root_rates,
     evaluated,
+    rate_template,
     root_rates,
     slope_formulas,
-    slope_template,
 )
 from cra_sym.solvers.waves_static import idle_coordinates, negative_motions
 
@@ -57,9 +58,7 @@ __all__ = ["Waves", "waves_route"]
 
 Array = NDArray[np.float64]
 _BLOCK = 8192  # parameter sets per block
-_STEP = 1e-30  # of a complex step (Squire and Trapp, SIAM Review 40, 1998)
 _NEAR = 1e-4  # relative distance of two roots below which their rates come from the modes
-_RATES_BLOCK = 1024  # with repetitions for the parameters
 _COST = 10  # cost of one root relative to one of a single wave number, to decide whether machine code pays
 
 
@@ -160,14 +159,18 @@ class Waves:
         if not (self.analytic and (z > 0).all()):
             return None
         found, refused = np.empty((len(positions), *z.shape)), []
-        parts = _slope_parts(self.structure, self.known)
+        parts, spectrum = (of(self.structure, self.known) for of in (_rate_parts, _parts))
         machine_code = wants_compiler(_COST * z.size, parts)
-        slopes = compiled_slopes(compiled(*parts())) if machine_code else self._slopes
+        if machine_code:
+            by_determinant = partial(compiled_root_rates, compiled(*parts()).rates)
+        else:
+            by_determinant = partial(root_rates, slopes=self._slopes)
+        counted = compiled(*spectrum()).counts if machine_code else None
 
         def fill(rows: slice) -> None:
-            for start in range(rows.start, rows.stop, _RATES_BLOCK):
-                part = slice(start, min(start + _RATES_BLOCK, rows.stop))
-                if not self._enter_rates(columns[:, part], z[part], positions, slopes, found[:, part]):
+            for start in range(rows.start, rows.stop, _BLOCK):
+                part = slice(start, min(start + _BLOCK, rows.stop))
+                if not self._enter_rates(columns[:, part], z[part], positions, by_determinant, counted, found[:, part]):
                     refused.append(start)
 
         if machine_code:
@@ -177,25 +180,37 @@ class Waves:
         return None if refused else list(found.reshape(-1, *omega.shape))
 
     @np.errstate(all="ignore")
-    def _enter_rates(self, columns: Array, z: Array, positions: Sequence[int], slopes: Slopes, found: Array) -> bool:
+    def _enter_rates(
+        self,
+        columns: Array,
+        z: Array,
+        positions: Sequence[int],
+        by_determinant: Callable[..., Array],
+        counted: Counts | None,
+        found: Array,
+    ) -> bool:
         """Fill in the rates for some sets of values; return whether their frequencies are roots of the determinant."""
         problem, simple = self._covered(columns)
         if not simple.all():
             return False
         rows, modes = z.shape
-        function = determinant(problem, self._functions)
-        by_k = root_rates(function, slopes, z.ravel(), np.repeat(np.arange(rows), modes)).reshape(-1, rows, modes)
-        steps = _steps(columns, positions)
-        moved = self._problem(np.tile(columns, len(positions)) + 1j * steps)[0].coefficients()
-        k_rates = moved.imag.reshape(-1, len(positions), rows)
-        apart = _apart(z, function)
-        for at, position in enumerate(positions):
-            step, total = steps[position, at * rows : (at + 1) * rows], np.zeros_like(z)
-            for by, k_rate in zip(by_k, k_rates[:, at], strict=True):
-                if k_rate.any():
-                    total += by * (k_rate / step)[:, None]
-            found[at] = np.where(apart, total, np.nan)
+        function = Determinant(problem.coefficients(), self.structure, self._functions, np.zeros(rows, dtype=np.int64))
+        by_k = by_determinant(function=function, z=z.T)  # the sets of values come last: loops along them are long
+        close = _close(z.T, function, counted)
+        for at, of_k in self._coefficient_rates(columns, positions):
+            total = np.zeros((modes, rows))
+            for k, rate in of_k.items():
+                total += by_k[k] * rate
+            total[close] = np.nan
+            found[at] = total.T
         return True
+
+    @cached_property
+    def _coefficient_rates(self) -> CoefficientRates:
+        def coefficients(columns: Array) -> Array:
+            return self._problem(columns)[0].coefficients(dispersion=False)
+
+        return CoefficientRates(coefficients, len(self.matrices.arguments), tuple(self.stiffnesses))
 
     def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> StateModes:
         """Return the modes of all the first frequencies."""
@@ -288,26 +303,23 @@ def _filled(values: Sequence[float | Array], rows: int) -> Array:
     return found
 
 
-def _steps(columns: Array, positions: Sequence[int]) -> Array:
-    """Return imaginary steps whose squares underflow, one parameter in each repetition of the sets of values."""
-    rows = columns.shape[1]
-    steps = np.zeros((len(columns), rows * len(positions)))
-    for at, position in enumerate(positions):
-        size = np.abs(columns[position])
-        steps[position, at * rows : (at + 1) * rows] = _STEP * np.where((size > 0.0) & np.isfinite(size), size, 1.0)
-    return steps
-
-
-def _apart(z: Array, function: Determinant) -> NDArray[np.bool_]:
-    """Return which of the lowest of ascending roots have no close neighbour, also among the next ones."""
-    near = np.diff(z, axis=1) < _NEAR * z[:, 1:]
-    after = function.count(z[:, -1] * (1.0 + _NEAR))[0] > z.shape[1]
-    before = np.zeros(len(z), dtype=bool)
-    return np.asarray(~(np.column_stack([near, after]) | np.column_stack([before, near])))
+def _close(z: Array, function: Determinant, counted: Counts | None) -> NDArray[np.bool_]:
+    """Return which of the lowest of ascending roots, shape (modes, rows), have a close neighbour, also the next one."""
+    near, beyond = np.diff(z, axis=0) < _NEAR * z[1:], z[-1] * (1.0 + _NEAR)
+    if counted is None:
+        number = function.count(beyond)[0]
+    else:
+        number = np.empty(beyond.size, dtype=np.int64)
+        counted(number, np.empty(beyond.size), beyond, function.k)
+    found = np.zeros(z.shape, dtype=bool)
+    found[-1] = number > len(z)
+    found[:-1] |= near
+    found[1:] |= near
+    return found
 
 
 def _any(values: Sequence[float | Array]) -> bool:
-    return any(np.any(value) for value in values)
+    return any(value.any() if isinstance(value, np.ndarray) else value != 0 for value in values)
 
 
 def _rows_first(values: Sequence[float | Array], rows: int, shape: tuple[int, ...], axis: int) -> Array:
@@ -323,9 +335,9 @@ def _parts(structure: Structure, known: tuple[int | None, ...]) -> Parts:
 
 
 @cache
-def _slope_parts(structure: Structure, known: tuple[int | None, ...]) -> Parts:
+def _rate_parts(structure: Structure, known: tuple[int | None, ...]) -> Parts:
     """Return the arguments of the text of the compiled rates, and its kernels."""
-    text = cache(lambda: slope_template(structure, known))
+    text = cache(lambda: rate_template(structure, known))
     return lambda: (text(), {})
 
 

@@ -21,8 +21,8 @@ from .waves_static import negative_energy, rigid_motions
 from .waves_structure import Structure
 
 __all__ = [
-    "QUICK", "Functions", "Search", "Structure", "UniformProblem", "determinant", "formulas", "kept", "lowest_waves",
-    "template",
+    "QUICK", "Counts", "Functions", "Search", "Structure", "UniformProblem", "determinant", "formulas", "kept",
+    "lowest_waves", "template",
 ]  # fmt: skip
 
 _BLOCK = 8192  # rows whose temporaries stay in the processor's cache
@@ -41,6 +41,9 @@ QUICK: dict[str, Callable[..., Any]] = {
 
 Search = Callable[[Floats, Integers, Floats, Integers], int]
 """Compiled version for one structure: the entry `lowest_waves` of `template` compiled by `cra_sym.kernels.compiled`."""
+
+Counts = Callable[[Integers, Floats, Floats, Floats], None]
+"""The entry `counts` of the same."""
 
 
 def template(structure: Structure, known: tuple[int | None, ...] | None = None) -> str:

@@ -16,6 +16,7 @@ from .waves_structure import Structure
 __all__ = [
     "KINDS", "Determinant", "Functions", "assembled", "block_columns", "block_waves", "condition", "count_of",
     "determinant_of", "direct", "displacements", "end_rows", "formulas", "kept", "kinds", "lowest_branch", "regime",
+    "regime_formula",
     "sections", "signs", "value_of", "wave_texts",
 ]  # fmt: skip
 
@@ -338,6 +339,11 @@ def lowest_branch(structure: Structure, k: Entries, turns: Any) -> Any:
         z = kernel.branch(wave, table)
         lowest = z if lowest is None else kernel.where((z < lowest) | (lowest != lowest), z, lowest)
     return lowest
+
+
+def regime_formula(structure: Structure, known: Sequence[int | None]) -> str:
+    """Return the text of ``_regime`` alone."""
+    return straight("_regime", _functions(structure, ())["_regime"], ["z"], known)
 
 
 class Determinant:

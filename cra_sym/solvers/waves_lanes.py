@@ -58,6 +58,11 @@ def lowest_waves(out, evaluations, k, zeros):
     return 0
 
 
+def counts(numbers, values, z, k):
+    """Fill in the number of roots below the points z, one in each lane, and the values there."""
+    _counts(numbers, values, z, k, z.size)
+
+
 def _deflated(value, z, zeros):
     for multiplicity in range(_MOST_ZEROS):
         value = value / (z if zeros > multiplicity else 1.0)

@@ -150,10 +150,11 @@ class UniformProblem:
         ]
 
     @np.errstate(invalid="ignore")
-    def coefficients(self) -> Floats:
+    def coefficients(self, *, dispersion: bool = True) -> Floats:
         """Return the coefficients that vary, as `Structure` orders them, shape (varying, rows).
 
-        Matrices times half the length, end conditions, polynomials of the dispersion relation.
+        Matrices times half the length, end conditions, polynomials of the dispersion relation: zeros instead of the
+        latter without ``dispersion``, as the value of the determinant does not depend on them.
         """
         structure, n, half = self.structure, len(self.odd), 0.5 * self.length
         matrices = self.odd_by_even, self.even_by_odd
@@ -168,7 +169,8 @@ class UniformProblem:
         for place in range(structure.places):
             if any(at in row for at in range(structure.condition(place), structure.condition(place + 1))):
                 self._enter_condition(row, place)
-        self._enter_dispersion(row)
+        if dispersion:
+            self._enter_dispersion(row)
         return k
 
     def all_coefficients(self) -> Floats:

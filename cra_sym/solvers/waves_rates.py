@@ -10,17 +10,18 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from importlib.resources import files
 from typing import Any
 
 import numpy as np
 
 from . import waves_kernel
 from .straight import Term, straight, wanted_lines
-from .waves_count import Determinant, Functions, determinant_of, kinds, wave_texts
+from .waves_count import Determinant, Functions, determinant_of, kinds, regime_formula, wave_texts
 from .waves_problem import Floats
 from .waves_structure import Structure
 
-__all__ = ["Slopes", "compiled_slopes", "evaluated", "root_rates", "slope_formulas", "slope_template"]
+__all__ = ["Slopes", "compiled_root_rates", "evaluated", "rate_template", "root_rates", "slope_formulas"]
 
 kernel: Any = waves_kernel  # formulas of arrays and terms, without types
 
@@ -40,16 +41,21 @@ def slope_formulas(structure: Structure, known: Sequence[int | None]) -> str:
     return "\n\n\n".join(texts) + "\n"
 
 
-def slope_template(structure: Structure, known: Sequence[int | None]) -> str:
-    """Return the same with an entry ``slopes_kind(out, k, z)`` for each regime, to compile."""
+def rate_template(structure: Structure, known: Sequence[int | None]) -> str:
+    """Return the text of the compiled version of `root_rates`: the formulas, and the loops over blocks of lanes."""
+    loops = files("cra_sym.solvers").joinpath("waves_rates_lanes.py").read_text(encoding="utf-8")
+    texts, choice = [loops, slope_formulas(structure, known)], ["def _rates_in(found, k, z, kind, size):"]
     names = [f"s{at}" for at in range(2 + sum(value is None for value in known))]
-    texts = [slope_formulas(structure, known)]
-    for kind in kinds(structure):
-        lines = [f"def slopes_{kind}(out, k, z):", "    for i in range(z.size):"]
+    for at, kind in enumerate(kinds(structure)):
+        lines = [f"def _rates_{kind}(found, k, z, size):", "    for i in range(size):"]
         lines.append(f"        {', '.join(names)} = _slopes_{kind}(k, i, z[i])")
-        lines += [f"        out[{at}, i] = {name}" for at, name in enumerate(names)]
-        texts.append("\n".join(lines) + "\n")
-    return "\n\n".join(texts)
+        lines.append(f"        scale = -1.0 / s1 if abs(s0) <= {_LARGEST} * abs(s1 * z[i]) else np.nan")
+        lines += [f"        found[{entry}, i] = {name} * scale" for entry, name in enumerate(names[2:])]
+        texts.append("\n".join(lines))
+        choice += [f"    if kind == {at}:", f"        _rates_{kind}(found, k, z, size)"]
+    called = tuple(f"_rates_{kind}" for kind in kinds(structure))
+    constants = f"_KINDS = {len(called)}\n_CALLED = {called}"
+    return "\n\n\n".join([*texts, regime_formula(structure, known), "\n".join(choice), constants]) + "\n"
 
 
 def _with_slopes(function: Callable[[Any, Any], Any], k: Sequence[Any], z: Any) -> list[Any]:
@@ -149,36 +155,31 @@ def evaluated(functions: Functions) -> Slopes:
     return slopes
 
 
-def compiled_slopes(entries: object) -> Slopes:
-    """Return the slopes by the entries of the compiled `slope_template`."""
-
-    def slopes(kind: str, k: Floats, z: Floats) -> Floats:
-        out = np.empty((2 + len(k), z.size))
-        getattr(entries, f"slopes_{kind}")(out, np.ascontiguousarray(k), z)
-        return out
-
-    return slopes
-
-
 @np.errstate(all="ignore")
-def root_rates(function: Determinant, slopes: Slopes, z: Floats, row: np.ndarray) -> Floats:
-    """Return dz/dk of simple roots, shape (varying coefficients, roots); nan where rounding would spoil them.
+def root_rates(function: Determinant, slopes: Slopes, z: Floats) -> Floats:
+    """Return dz/dk of simple roots, shape (varying coefficients, modes, rows); nan where rounding would spoil them.
 
     Parameters
     ----------
     function : Determinant
     slopes : callable
-    z : ndarray, shape (roots,)
+    z : ndarray, shape (modes, rows)
         Positive roots as `lowest_waves` gives them.
-    row : ndarray of int, shape (roots,)
-        The row of each.
     """
-    found = np.empty((len(function.k), z.size))
-    for start in range(0, z.size, _BLOCK):
+    roots, row = z.ravel(), np.tile(np.arange(z.shape[1]), len(z))
+    found = np.empty((len(function.k), roots.size))
+    for start in range(0, roots.size, _BLOCK):
         part = slice(start, start + _BLOCK)
-        k, at, rates = function.k[:, row[part]], z[part], found[:, part]
+        k, at, rates = function.k[:, row[part]], roots[part], found[:, part]
         for kind, members in function.take(row[part]).regimes(at):
-            value, by_z, *by_k = slopes(kind, k[:, members], at[members])
+            value, by_z, *_ = out = slopes(kind, k[:, members], at[members])
             sound = np.abs(value) <= _LARGEST * np.abs(by_z * at[members])
-            rates[:, members] = by_k * np.where(sound, -1.0 / by_z, np.nan)
+            rates[:, members] = out[2:] * np.where(sound, -1.0 / by_z, np.nan)
+    return found.reshape(-1, *z.shape)
+
+
+def compiled_root_rates(rates: Callable[..., None], function: Determinant, z: Floats) -> Floats:
+    """Return the result of `root_rates` by the compiled entry of `rate_template`."""
+    found = np.empty((len(function.k), *z.shape))
+    rates(found, function.k, np.ascontiguousarray(z))
     return found
