@@ -47,6 +47,7 @@ _HOME = {
     "identify_slip": "analysis.slip_identification",
     "input_shaper": "analysis.shaping",
     "certify": "analysis.certification",
+    "certify_eigenvalues": "analysis.certification",
     "certify_stability": "analysis.certified_stability",
     "AxialBase": "model.excitations",
     "Fluctuation": "model.excitations",
@@ -82,7 +83,7 @@ _HOME = {
 __all__ = ["__version__", *_HOME]
 
 
-def __getattr__(name):
+def __getattr__(name: str) -> object:
     try:
         module = import_module(f"cra_sym.{_HOME[name]}")
     except KeyError:
@@ -92,5 +93,5 @@ def __getattr__(name):
     return value
 
 
-def __dir__():
+def __dir__() -> list[str]:
     return sorted(__all__)

@@ -2,6 +2,7 @@ from .analysis.backbone import Backbone as Backbone
 from .analysis.backbone import backbone as backbone
 from .analysis.basins import basins as basins
 from .analysis.certification import certify as certify
+from .analysis.certification import certify_eigenvalues as certify_eigenvalues
 from .analysis.certified_stability import certify_stability as certify_stability
 from .analysis.critical import critical_value as critical_value
 from .analysis.eigenvalues import count_eigenvalues as count_eigenvalues

@@ -103,6 +103,7 @@ GOOD = {
     ),
     "input_shaper": dict(angular_frequency=10.0, zeta=0.01, order=1),
     "certify": dict(system=ARM, modes=1),
+    "certify_eigenvalues": dict(system=ARM, modes=1, oscillating=True),
     "certify_stability": dict(system=ARM, excitation=SPRING, angular_frequency=28.0, epsilon=0.05, modes=1),
     "AxialBase": dict(amplitude=0.01),
     "JointStiffness": dict(k_t=1.0, k_r=0.5),

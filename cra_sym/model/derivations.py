@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from sympy import Expr, Function, Pow, S, Symbol, cancel, integrate
+from sympy import Expr, S, Symbol, cancel, integrate
 
 from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
+from cra_sym.model.ball_problem import ball_layout, ball_problem
 from cra_sym.model.conservative_part import beside, conservative_part, elastic_part, stiffness_beside
 from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, driven_spatial, pushed
 from cra_sym.model.energies import stress_route
 from cra_sym.model.energy_signs import leading, masses
-from cra_sym.model.exact import BallProblem, exact_kernel
 from cra_sym.model.excited import axial, fluctuating, fluctuation
 from cra_sym.model.forms import form_of
 from cra_sym.model.held_motions import HeldMotions, moving_supports
@@ -30,11 +30,13 @@ from cra_sym.model.pencil_route import pencil_route as pencil
 from cra_sym.model.projection import BilinearForm, EndParameter
 from cra_sym.model.routes import GeneralRoute, Route
 from cra_sym.model.spatial import SpatialProblem, spatial_problem
-from cra_sym.model.symmetry import asymmetry, is_gyroscopic
+from cra_sym.model.symmetry import asymmetry
 from cra_sym.model.waves import waves_route
 
 __all__ = [
     "axial",
+    "ball_layout",
+    "ball_problem",
     "causes",
     "complex_modes",
     "conservative_part",
@@ -273,56 +275,3 @@ def damped(model: Model) -> bool:
 def conservative(model: Model) -> bool:
     """Return whether all forces have a potential and none is of first order in time."""
     return not model.state_form.damped and not asymmetry(model.state_form)
-
-
-def ball_problem(model: Model) -> BallProblem:
-    """Return the uniform conservative problem in a form that is exact for any kind of number.
-
-    Raises
-    ------
-    ValueError
-        If a coefficient varies along x, or is not a rational function of the parameters; if forces are not
-        conservative, dampers beside gyroscopic terms included.
-    """
-    turning = model.numerics("conservative_part") is not None
-    if turning and not is_gyroscopic(model.linearised):
-        raise ValueError(
-            "system: certification needs forces that do not follow the motion, and no dampers beside gyroscopic terms; "
-            "use eigenvalues and count_eigenvalues, or system.conservative_part"
-        )
-    form = model.state_form if turning else model.conservative
-    acting = tuple(point for point in form.points if point[2] or any(point[1]))  # others are places of loads
-    if not replace(form, points=acting).uniform:
-        cure = "natural_frequencies with system.accuracy estimates the error, system.check() compares two routes"
-        cure = "eigenvalues and count_eigenvalues are two routes" if turning else cure
-        raise ValueError(
-            f"system: certification needs coefficients that are constant along x, without terms inside; {cure}"
-        )
-    weak = weak_form(model.linearised.variation)
-    powers = (0, 1, 2) if turning else (0, 2)
-    pairs = [pair for pair, entry in weak.inside.items() if not entry.keys().isdisjoint(powers)]
-    _, highest, _ = weak.fields()
-    orders = {jet.unknown: jet.space for jet in highest}
-    fields = [pair for pair in pairs if all(jet.unknown in orders for jet in pair)]
-    entries = [weak.inside[p].get(power, S.Zero) if power in powers else S.Zero for p in fields for power in range(3)]
-    left, right = model.equations.domain
-    z = form.parameter
-    for entry in (*form.system, *form.boundary, *form.free, *entries, right - left):
-        irrational = sorted(map(str, (a for a in entry.atoms(Function, Pow) if not (a.is_Pow and a.exp.is_Integer))))
-        if irrational:
-            raise ValueError(
-                f"system: the coefficients contain {irrational[0]}: certification needs rational functions of the "
-                f"parameters; put a parameter in place of {irrational[0]}"
-            )
-    return BallProblem(
-        len(form.displacements),
-        len(form.coordinates),
-        tuple(((p.unknown, q.unknown), (p.space, q.space)) for p, q in fields),
-        tuple(orders.values()),
-        exact_kernel(list(form.system), (z, *model.symbols)),
-        exact_kernel(list(form.boundary), (z, *model.symbols)),
-        exact_kernel([right - left, left], model.symbols),
-        exact_kernel(list(form.free), model.symbols),
-        exact_kernel(entries, model.symbols),
-        turning,
-    )

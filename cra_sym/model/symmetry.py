@@ -12,7 +12,7 @@ from cra_sym.mechanics.breakpoints import switches
 from cra_sym.mechanics.hamilton import HamiltonResult
 from cra_sym.mechanics.weak import weak_form
 
-__all__ = ["asymmetry", "is_gyroscopic", "odd_in_time", "vanishes"]
+__all__ = ["asymmetry", "is_gyroscopic", "is_symmetric", "odd_in_time", "vanishes"]
 
 
 def odd_in_time(term: Expr, t: Symbol) -> bool:
@@ -75,12 +75,22 @@ def asymmetry(form: StateForm) -> str:
 
 def is_gyroscopic(equations: HamiltonResult) -> bool:
     """Tell whether forces of first order in time do no work and all others have a potential."""
+    return _reciprocal(equations, -1)
+
+
+def is_symmetric(equations: HamiltonResult) -> bool:
+    """Tell whether forces of first order in time are those of dampers and all others have a potential."""
+    return _reciprocal(equations, 1)
+
+
+def _reciprocal(equations: HamiltonResult, first: int) -> bool:
+    """Tell whether all forms are symmetric, those of first order up to a sign."""
     weak = weak_form(equations.variation)
     for form in (weak.inside, weak.discrete):
         for (p, q), entry in form.items():
             other = form.get((q, p), {})
             for power in {*entry, *other}:
-                sign = -1 if power == 1 else 1
+                sign = first if power == 1 else 1
                 if not vanishes(entry.get(power, S.Zero) - sign * other.get(power, S.Zero), weak.variation.space.x):
                     return False
     return True

@@ -12,15 +12,18 @@ from contextlib import contextmanager
 from threading import RLock
 from typing import Any, Protocol, TypeVar
 
+import numpy as np
+
 from ..cached import released_in_children
 
-__all__ = ["Counted", "UndecidedError", "decided", "enclose", "negatives", "precision"]
+__all__ = ["Counted", "UndecidedError", "decided", "enclose", "negatives", "outward", "precision"]
 
 FIRST_PRECISION = 192
 _LARGEST_PRECISION = 12_288
 _NEAREST = -53  # exponent of two of the first relative width tried, twice the target width
 _WIDEST = -8
 _EQUAL = -40  # times the target width: frequencies that are closer share an enclosure
+_SMALL = 1, 8, 32  # exponents of two by which a frequency lies below the first, only rigid-body modes below it
 
 Result = TypeVar("Result")
 _ALONE = released_in_children(RLock())
@@ -48,7 +51,7 @@ class Counted(Protocol):
         """Return the proved number of natural frequencies below the point, those at 0 included."""
 
 
-def decided(flint: Any, attempt: Callable[[], Result]) -> Result:
+def decided(flint: Any, attempt: Callable[[], Result], most: int = _LARGEST_PRECISION) -> Result:
     """Return the result of an attempt at the lowest working precision that raises no :class:`UndecidedError`.
 
     Parameters
@@ -56,20 +59,22 @@ def decided(flint: Any, attempt: Callable[[], Result]) -> Result:
     flint : module
         ``flint`` of python-flint; its context's precision is restored at the end.
     attempt : callable
+    most : int
+        Bits of the largest precision.
 
     Raises
     ------
     UndecidedError
-        If 12288 bits are not enough.
+        If that is not enough.
     """
     bits = FIRST_PRECISION
-    while bits <= _LARGEST_PRECISION:
+    while bits <= most:
         with precision(flint, bits):
             try:
                 return attempt()
             except (UndecidedError, ZeroDivisionError):
                 bits *= 2
-    raise UndecidedError(f"a sign is not decided at {_LARGEST_PRECISION} bits")
+    raise UndecidedError(f"a sign is not decided at {most} bits")
 
 
 def negatives(matrix: Sequence[Sequence[Any]]) -> int:
@@ -96,6 +101,24 @@ def negatives(matrix: Sequence[Sequence[Any]]) -> int:
     return number
 
 
+def outward(ball: Any, towards: float) -> float:
+    """Return the nearest floating-point number outside the ball on one side; exact zero stays zero.
+
+    Parameters
+    ----------
+    ball : arb
+    towards : float
+        -inf or inf.
+    """
+    if ball == 0:
+        return 0.0
+    edge = ball.lower() if towards < 0 else ball.upper()
+    number = float(edge)
+    while not (type(ball)(number) <= edge if towards < 0 else type(ball)(number) >= edge):
+        number = float(np.nextafter(number, towards))
+    return number
+
+
 def enclose(flint: Any, problem: Counted, guesses: Iterable[float]) -> list[tuple[Any, Any]]:
     """Return a proved enclosure of each of the first natural frequencies.
 
@@ -119,8 +142,13 @@ def enclose(flint: Any, problem: Counted, guesses: Iterable[float]) -> list[tupl
     UndecidedError
         If a sign cannot be proved, or a frequency is not near its guess.
     """
-    zero = flint.arb(0)
+    zero, guesses = flint.arb(0), list(guesses)
     with precision(flint, FIRST_PRECISION):
+        first = next((guess for guess in guesses if guess > 0.0), 1.0)
+        if problem.zeros and not any(
+            problem.count(flint.arb(first) * flint.arb(2) ** -power) == problem.zeros for power in _SMALL
+        ):
+            raise UndecidedError("there are other motions near zero frequency, or unstable ones")
         return [
             (zero, zero) if number < problem.zeros else _enclosure(flint, problem, number, guess)
             for number, guess in enumerate(guesses)

@@ -10,7 +10,9 @@ import pytest
 import sympy as sp
 
 import cra_sym as cra
-from cra_sym.analysis.certification import _counted
+from cra_sym.model.ball_problem import bound
+from cra_sym.solvers.ball_spans import static_solutions
+from cra_sym.solvers.ball_stiffness import BallStiffness
 from cra_sym.solvers.certificates import UndecidedError, decided, enclose, negatives
 from cra_sym.symbols import L, t, v, w, x
 
@@ -95,7 +97,8 @@ def counted(system, index=()):
     """The problem of one member of a batch in ball arithmetic."""
     names, held = system.numerics("names"), system.numerics("stiffnesses")
     values = {name: float(np.broadcast_to(system.values[name], system.shape)[index]) for name in names}
-    return _counted(flint, system.numerics("ball_problem"), held, values)
+    problem = bound(flint, system.numerics, held, values, damped=False)
+    return BallStiffness(flint, problem.balls, static_solutions(flint, problem.exact))
 
 
 def test_the_proved_number_of_frequencies_is_the_solver_s():
@@ -268,12 +271,78 @@ def test_a_shaft_with_a_disc_is_certified():
     for number in range(5):  # just below and above each
         below, above = (2 * np.pi * proof.lower[number] * (1 + side * 1e-6) for side in (-1, 1))
         assert cra.count_eigenvalues(shaft, [below, above]).tolist() == [2 * number, 2 * number + 2]
-    with pytest.raises(ValueError, match="not positive definite"):
-        cra.certify(shaft.replace(k=0.0))
+    # without springs the potential energy is not positive definite, and the determinant proves
     c = sp.Symbol("c")
     damped = shaft.model.replace(virtual_work=[(-c * v.diff(t), v, "right")]).at({**shaft.values, "c": 0.1})
-    with pytest.raises(ValueError, match="no dampers beside gyroscopic terms"):
-        cra.certify(damped)
+    for other in (shaft.replace(k=0.0), damped):
+        proof = cra.certify(other, 3)
+        assert proof.complete
+        assert np.abs(cra.eigenvalues(other, 3).imag / (2 * np.pi) / proof.lower - 1).max() < 1e-11
+
+
+def test_a_length_of_pi_makes_no_rigid_motion():
+    """Pi is irrational: a string between fixed ends had been certified to have a rigid motion."""
+    mass, N = sp.symbols("mass N")
+    string = cra.Model(
+        mass * v.diff(t) ** 2 / 2 - N * v.diff(x) ** 2 / 2,
+        fields=[v], x=x, domain=(0, sp.pi), t=t, essential=[v.subs(x, 0), v.subs(x, sp.pi)],
+    )  # fmt: skip
+    proof = cra.certify(string.at({mass: 1.0, N: 1.0}), 3)
+    with mp.workdps(40):
+        exact = [n / (2 * mp.pi) for n in (1, 2, 3)]
+    assert proof.complete and all(a <= f <= b for a, f, b in zip(proof.lower, exact, proof.upper, strict=True))
+    free = cra.certify(string.replace(essential=[]).at({mass: 1.0, N: 1.0}), 2)
+    assert free.complete and free.upper[0] == 0.0 and free.lower[1] <= exact[0] <= free.upper[1]
+
+
+def test_a_stepped_string_with_a_mass_inside_is_certified():
+    """Its condition where the parts meet, in 40 digits; the places lie in any order."""
+    T, rho_, a, b, m = sp.symbols("T rho a b m")
+    density = rho_ * (1 + 2 * sp.Heaviside(x - a)) * v.diff(t) ** 2 / 2 - T * v.diff(x) ** 2 / 2
+    string = cra.Model(
+        density, fields=[v], x=x, domain=(0, 1), t=t, essential=[v.subs(x, 0), v.subs(x, 1)],
+        inside=[(b, m * v.diff(t) ** 2 / 2)],
+    )  # fmt: skip
+    places = {"a": 0.25, "b": np.array([0.5, 0.25, 0.125])}
+    proof = cra.certify(string.at({"T": 2.0, "rho": 1.0, "m": 0.3, **places}), 4)
+    assert proof.complete.all()
+    with mp.workdps(40):
+        slow, fast = mp.sqrt(mp.mpf(1) / 2), mp.sqrt(mp.mpf(3) / 2)
+        for row, at in enumerate(places["b"]):
+
+            def meet(f, at=float(at)):
+                w = 2 * mp.pi * f
+                state = [mp.mpf(0), mp.mpf(1)]  # displacement and tension times slope
+                steps = sorted({0.25, at, 1.0})
+                for left, right in zip([0.0, *steps], steps, strict=False):
+                    wave = w * (slow if right <= 0.25 else fast)
+                    cos, sin = mp.cos(wave * (right - left)), mp.sin(wave * (right - left)) / (2 * wave)
+                    state = [cos * state[0] + sin * state[1], cos * state[1] - 4 * wave**2 * sin * state[0]]
+                    if right == at:
+                        state[1] -= mp.mpf(0.3) * w**2 * state[0]
+                return state[0]
+
+            for low, high in zip(proof.lower[row], proof.upper[row], strict=True):
+                assert high - low <= 4 * np.spacing(high)
+                assert meet(mp.mpf(low)) * meet(mp.mpf(high)) < 0
+
+
+def test_a_table_of_steps_and_a_support_inside_are_certified():
+    """A support at the node of a mode leaves that mode; other frequencies lie at or above those without it."""
+    EI, rho_ = sp.symbols("EI rho")
+    table = cra.stations(x, [(0, 3.0), (0.25, 2.0), (0.75, 3.0)], kind="step")
+    ends = [v.subs(x, 0), v.subs(x, 1)]
+    beam = cra.Model(
+        rho_ * v.diff(t) ** 2 / 2 - EI * table * v.diff(x, 2) ** 2 / 2,
+        fields=[v], x=x, domain=(0, 1), t=t, essential=ends,
+    )  # fmt: skip
+    held = beam.replace(essential=[*ends, v.subs(x, HALF)])
+    free, proof = (cra.certify(made.at({EI: 2.0, rho_: 1.0}), 4) for made in (beam, held))
+    assert free.complete and proof.complete
+    assert abs(proof.lower[0] / free.lower[1] - 1) < 1e-15 and abs(proof.lower[2] / free.lower[3] - 1) < 1e-15
+    assert (proof.lower >= free.lower).all()
+    found = beam.at({EI: 2.0, rho_: 1.0})
+    assert (np.abs(cra.natural_frequencies(found, 4) / free.lower - 1) <= found.accuracy + 1e-13).all()
 
 
 def test_lumped_gyroscopic_systems_are_certified():

@@ -116,6 +116,7 @@ def calls(name: str) -> dict[str, dict[str, Any]]:
         "sweep": {"system": system, "quantity": "natural_frequencies", "modes": 2, "chunks": None, "store": None,
                   "client": None, "m_e": [0.1, 0.2]},
         "certify": {"system": system, "modes": 1},
+        "certify_eigenvalues": {"system": system, "modes": 1},
     }  # fmt: skip
     if name == "arm":
         found["residual_vibration_gradient"] = {"system": system, "motion": move, "by": ("k_r", "duration"), "modes": 2}

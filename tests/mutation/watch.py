@@ -223,6 +223,13 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/analysis/test_responses.py"]],
     "solvers/floquet_lanes": [[f"{_LANES[0]}::test_floquet"]],
     "solvers/certificates": [["tests/analysis/test_certification.py"]],
+    "solvers/ball_stiffness": [["tests/analysis/test_certification.py"]],
+    "solvers/ball_determinant": [["tests/analysis/test_certified_eigenvalues.py"]],
+    "solvers/enclosed_zeros": [
+        ["tests/solvers/test_enclosed_zeros.py"],
+        ["tests/analysis/test_certified_eigenvalues.py"],
+    ],
+    "solvers/eigenvalue_enclosures": [["tests/analysis/test_certified_eigenvalues.py"]],
     "solvers/coupled_modes": [_COUPLED],
     "solvers/driven_modes": [_COUPLED, ["tests/analysis/test_responses.py"]],
     "solvers/eigenvalues": _STIFFNESS,
