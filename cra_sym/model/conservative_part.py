@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sympy import Add, Basic, Derivative, Expr, S, Symbol, expand, sympify
+import numpy as np
+from sympy import Add, Basic, Derivative, Expr, Mul, Poly, S, Subs, Symbol, expand, hessian, sympify
 from sympy.core.function import AppliedUndef
 
 from cra_sym.mechanics.jets import END_NAMES
@@ -15,6 +16,7 @@ from cra_sym.model.projection import BilinearForm
 if TYPE_CHECKING:
     from cra_sym.model.lagrangian import Model
 
+_ROUNDING = 1e-12  # eigenvalue of a form, relative to its entries, that counts as zero
 __all__ = ["beside", "conservative_part", "elastic_part", "stiffness_beside"]
 
 
@@ -33,17 +35,52 @@ def elastic_part(model: Model) -> Model | None:
     """Return the same with no more than the potential energy of the highest derivatives along the span.
 
     Gyroscopic terms may stabilise a structure that buckles without them, as under the centrifugal forces of rotation.
-    Lumped coordinates alone have one of the form of their kinetic energy instead: all frequencies are 1 rad/s.
+    Of ends, interior places and coordinates it keeps the potential energies that are not negative for positive
+    parameters. Lumped coordinates alone have one of the form of their kinetic energy instead: all frequencies are
+    1 rad/s.
     """
     part = _part(model, leading=True)
-    if part is None or part.options["fields"]:
-        return part
-    found = part.replace(**{end: _standing(part.options[end]) for end in END_NAMES})
+    if part is None:
+        return None
+    options, change = part.options, _resisting if part.options["fields"] else _standing
+    found = part.replace(
+        **{end: change(options[end], options["t"]) for end in END_NAMES},
+        inside=tuple((place, change(term, options["t"])) for place, term in options["inside"]),
+    )
     found.symbols = model.symbols
     return found
 
 
-def _standing(energy: Expr | None) -> Expr | None:
+def _resisting(energy: Expr | None, t: Symbol) -> Expr | None:
+    """Return the terms of a Lagrangian with rates, and of the others those with a coefficient that make no motion grow.
+
+    These are quadratic forms in displacements, minus a sum of squares.
+    """
+    if energy is None:
+        return None
+    moving, forms = S.Zero, dict[Expr, Expr]()
+    for term in Add.make_args(expand(energy)):
+        if any(node.has(t) and t in node.variables for node in term.atoms(Derivative)):
+            moving += term
+            continue
+        number, factors = term.as_coeff_mul()
+        coefficient = Mul(*(factor for factor in factors if not factor.has(AppliedUndef)))
+        forms[coefficient] = forms.get(coefficient, S.Zero) + number * Mul(*(f for f in factors if f.has(AppliedUndef)))
+    return moving + Add(*(coefficient * form for coefficient, form in forms.items() if _never_positive(form)))
+
+
+def _never_positive(form: Expr) -> bool:
+    """Tell whether an expression in displacements is a quadratic form without positive eigenvalues."""
+    inner = [node for node in form.atoms(AppliedUndef, Derivative, Subs)]
+    places = [node for node in inner if not any(node != other and other.has(node) for other in inner)]
+    read = Poly(form, *places)
+    if not read.is_homogeneous or read.total_degree() != 2:
+        return False
+    matrix = np.array(hessian(form, places), dtype=float)
+    return bool(np.linalg.eigvalsh(matrix).max() <= _ROUNDING * np.abs(matrix).max())
+
+
+def _standing(energy: Expr | None, _t: Symbol) -> Expr | None:
     """Return the kinetic energy in a Lagrangian, minus the same of displacements in place of their rates."""
     if energy is None:
         return None

@@ -210,8 +210,8 @@ class System:
     def basis(self) -> System:
         """The system whose natural modes equations are projected on: the conservative part, unless it has buckled.
 
-        Then it is the elastic part: without potential energies of other than the highest derivatives by x, and of
-        lumped coordinates alone with a positive one in place of theirs.
+        Then it is the elastic part: without potential energies of other than the highest derivatives by x, and without
+        those of ends, places and coordinates that buckle it; coordinates alone have a positive one in place of theirs.
         """
         part = self.conservative_part
         if part is not self:

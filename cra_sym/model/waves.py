@@ -144,12 +144,19 @@ class Waves:
         problem, simple = self._covered(columns)
         if simple.all():
             squares[...] = lowest_waves(problem, modes, search, self._functions)
-            return
-        if simple.any():
+        elif simple.any():
             part = problem.take(np.flatnonzero(simple))
             squares[simple] = lowest_waves(part, modes, search, self._functions)
-        rest = columns[:, ~simple]
-        squares[~simple] = self._general.angular_frequencies(list(rest), rest.shape[1:], modes) ** 2
+        if simple.any() and self.structure.linked and len(self.structure.sizes) + self.structure.coordinates > 2:
+            # symmetric structures have double roots, which one determinant gives to half the digits
+            some = np.flatnonzero(simple)
+            k, zeros = problem.take(some).coefficients(), np.zeros(some.size, dtype=np.int64)
+            function = Determinant(k, self.structure, self._functions, zeros)
+            counted = compiled(*_parts(self.structure, self.known)()).counts if search else None
+            simple[some] = ~_close(squares[some].T, function, counted).any(axis=0)
+        if not simple.all():
+            rest = columns[:, ~simple]
+            squares[~simple] = self._general.angular_frequencies(list(rest), rest.shape[1:], modes) ** 2
 
     def rates(
         self, values: Values, shape: tuple[int, ...], omega: Array, positions: Sequence[int]

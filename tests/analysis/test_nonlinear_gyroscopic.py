@@ -172,6 +172,37 @@ def test_a_shaft_in_its_rotating_frame(loaded):
     assert whirls[0][1] > 1.1 * whirls[0][0]  # the foundation hardens
 
 
+@pytest.mark.parametrize("place", ["carriage", "disc"])
+def test_what_a_shaft_carries_in_a_rotating_frame(place):
+    """Centrifugal forces on a mass beside the shaft, or on its end, buckle it too: whirls in space are the same."""
+    length, rhoA, EI, Omega, m = sp.symbols("l rhoA EI Omega m")
+    v, u = (sp.Function(name)(x, t) for name in ("v", "u"))
+
+    def turns(one, other, mass):
+        return mass * ((one.diff(t) - Omega * other) ** 2 + (other.diff(t) + Omega * one) ** 2) / 2
+
+    carried = (p, q) if place == "carriage" else (v, u)
+    joint = (
+        sum((one - other) ** 2 for one, other in zip((v, u), (p, q), strict=True))
+        if place == "carriage"
+        else v**2 + u**2
+    )
+    shaft = cra.Model(
+        turns(v, u, rhoA) - EI * (v.diff(x, 2) ** 2 + u.diff(x, 2) ** 2) / 2,
+        fields=[v, u], coordinates=[p, q] if place == "carriage" else [], x=x, domain=(0, length), t=t,
+        essential=[part.subs(x, 0) for field in (v, u) for part in (field, field.diff(x))],
+        right=turns(*carried, m) - k * joint / 2 - k_3 * joint**2 / 4,
+    )  # fmt: skip
+    values = {"rhoA": 0.3, "EI": 5.0, "l": 1.0, "m": 0.05, "k": 30.0, "k_3": 1e4}
+    below, above = (
+        cra.backbone(shaft.at(values | {"Omega": speed}), mode, amplitude=0.02, modes=8, harmonics=3)
+        for speed, mode in ((1.0, 2), (60.0, 3 if place == "carriage" else 2))
+    )
+    whirl = below.angular_frequency - 1.0
+    assert abs(60.0 - above.angular_frequency) == pytest.approx(whirl, rel=1e-4)  # of the modes left out
+    assert above.amplitude == pytest.approx(0.02)
+
+
 def test_what_follows_the_motion_has_no_backbone():
     work = [(-n * p, q, None), (n * q, p, None)]
     model = cra.Model(0, left=MOVES - k * (p**2 + q**2) / 2 - k_3 * p**4 / 4, virtual_work=work, **LUMPED)

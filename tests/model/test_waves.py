@@ -158,6 +158,38 @@ def test_rigid_motions_of_tied_fields_are_exact_zeros():
     assert (omega[:2] == 0.0).all() and omega[2] > 0.0
 
 
+def test_a_star_of_strings_and_two_planes_with_a_carriage_have_double_frequencies():
+    """Of three equal strings joined by springs, two motions leave the centre at rest: N q cos q + 3 k L sin q = 0."""
+    strings = [sp.Function(f"v_{i}")(x, t) for i in range(3)]
+    pairs = list(zip(strings, strings[1:] + strings[:1], strict=True))
+    star = model(
+        sum(m * one.diff(t) ** 2 / 2 - T * one.diff(x) ** 2 / 2 for one in strings),
+        strings, None, -k * sum((one - other) ** 2 for one, other in pairs) / 2, *(one.subs(x, 0) for one in strings),
+    ).at({name: GIVEN[name] for name in ("m", "T", "k", "L")})  # fmt: skip
+    squares = star.natural_frequencies(6) ** 2
+    wave = np.sqrt(squares * GIVEN["m"] / GIVEN["T"]) * GIVEN["L"]
+    residue = GIVEN["T"] * wave * np.cos(wave) + 3 * GIVEN["k"] * GIVEN["L"] * np.sin(wave)
+    np.testing.assert_allclose(wave[[0, 3]], [np.pi / 2, 3 * np.pi / 2], rtol=1e-14)
+    # the slope of the residue is about 3 k L = 108, beside which 1e-12 of the frequencies count
+    np.testing.assert_allclose(residue[[1, 2, 4, 5]], 0.0, atol=1e-10)
+    p, q = (sp.Function(name)(t) for name in "pq")
+
+    def carriage(planes):
+        return cra.Model(
+            sum(m * one.diff(t) ** 2 / 2 - EI * one.diff(x, 2) ** 2 / 2 for one, _ in planes),
+            fields=[one for one, _ in planes], coordinates=[moved for _, moved in planes], x=x, domain=(0, L), t=t,
+            right=sum(m_e * moved.diff(t) ** 2 / 2 - k * (one - moved) ** 2 / 2 for one, moved in planes),
+            essential=[part.subs(x, 0) for one, _ in planes for part in (one, one.diff(x))],
+        ).at({name: GIVEN[name] for name in ("m", "EI", "k", "m_e", "L")})  # fmt: skip
+
+    alone, both_planes = carriage([(v, p)]), carriage([(v, p), (w, q)])
+    for number in (1, 6):
+        expected = np.repeat(alone.natural_frequencies(3), 2)[:number]
+        np.testing.assert_allclose(both_planes.natural_frequencies(number), expected, rtol=1e-12)
+    for system in (star, both_planes):
+        np.testing.assert_allclose(system.form("rates", 6)["mass"], np.eye(6), atol=1e-10)
+
+
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_free_strings_on_foundations_move_in_cosines(number):
     """Coupled ones too, K u = z M u with T (j pi)^2 added: at j = 0 a section moves without any force along it."""
