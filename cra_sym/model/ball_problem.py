@@ -9,7 +9,7 @@ from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from sympy import Function, Matrix, Pow, S
+from sympy import Expr, Float, Function, Matrix, Pow, Rational, S
 
 from cra_sym.mechanics.breakpoints import switches
 from cra_sym.mechanics.weak import weak_form
@@ -20,8 +20,6 @@ from cra_sym.model.symmetry import asymmetry, is_gyroscopic, is_symmetric
 from cra_sym.solvers.ball_spans import EnergyTerm, Node, Span, Spanned
 
 if TYPE_CHECKING:
-    from sympy import Expr
-
     from cra_sym.mechanics import StateForm
     from cra_sym.mechanics.jets import Jet
     from cra_sym.model.lagrangian import Model
@@ -236,7 +234,8 @@ def ball_layout(model: Model, damped: bool) -> BallLayout:
     ValueError
         If they do so elsewhere than at the zeros of expressions of first degree in x.
     """
-    form, entries = _form(model, damped), _energy(model, damped)[2]
+    exact = _exact(model)
+    form, entries = _form(exact, damped), _energy(exact, damped)[2]
     x, symbols = form.x, model.symbols
     pairs = []
     for switch in switches([*form.system, *entries], x):
@@ -244,7 +243,7 @@ def ball_layout(model: Model, damped: bool) -> BallLayout:
         if slope is None:
             raise _varying(switch.expression)
         pairs += [switch.expression.subs(x, 0), slope]
-    left, right = model.equations.domain
+    left, right = exact.equations.domain
     places = [place for place, _, _ in _acting(form)]
     return BallLayout(*(exact_kernel(_rational(parts), symbols) for parts in ([left, right], places, pairs)))
 
@@ -265,8 +264,9 @@ def ball_problem(model: Model, damped: bool, pattern: Pattern) -> BallProblem:
     ValueError
         If a coefficient varies along x between these places, or is not a rational function of the parameters.
     """
-    form = _form(model, damped)
-    fields, orders, entries = _energy(model, damped)
+    exact = _exact(model)
+    form = _form(exact, damped)
+    fields, orders, entries = _energy(exact, damped)
     x, z, symbols, points = form.x, form.parameter, model.symbols, _acting(form)
     found = switches([*form.system, *entries], x)
     acting, signs = pattern
@@ -300,9 +300,26 @@ def ball_problem(model: Model, damped: bool, pattern: Pattern) -> BallProblem:
         exact_kernel(_rational(form.free), symbols),
         not form.damped,
         not asymmetry(form),
-        form.damped and is_gyroscopic(model.linearised),
-        form.damped and is_symmetric(model.linearised),
+        form.damped and is_gyroscopic(exact.linearised),
+        form.damped and is_symmetric(exact.linearised),
     )
+
+
+def _exact(model: Model) -> Model:
+    """Return the model with fractions in place of its floating-point numbers, with which a derivation would round."""
+    rounded = False
+
+    def put(piece: Any) -> Any:
+        nonlocal rounded
+        if isinstance(piece, (tuple, list)):
+            return tuple(map(put, piece))
+        numbers = {piece} if isinstance(piece, float) else piece.atoms(Float) if isinstance(piece, Expr) else set()
+        rounded |= bool(numbers)
+        exact = {number: Rational(number) for number in numbers}
+        return piece.xreplace(exact) if isinstance(piece, Expr) else exact.get(piece, piece)
+
+    options = {name: put(piece) for name, piece in model.steady.options.items()}
+    return type(model)(**options | {"quadratures": dict(options["quadratures"])}) if rounded else model
 
 
 def _form(model: Model, damped: bool) -> StateForm:

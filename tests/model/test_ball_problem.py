@@ -9,9 +9,12 @@ import sympy as sp
 
 import cra_sym as cra
 from cra_sym.mechanics.breakpoints import switches
+from cra_sym.model.ball_problem import bound
 from cra_sym.model.exact import exact_kernel, exact_matrix
 from cra_sym.model.resolved import resolved
 from cra_sym.symbols import t, v, x
+
+flint = pytest.importorskip("flint", reason="the extra 'certify' brings python-flint")
 
 a, b, c, z = sp.symbols("a b c z")
 
@@ -21,6 +24,19 @@ def test_fractions_stay_fractions():
     kernel = exact_kernel([1 / a, 0.1 + b / 3, sp.Integer(2) ** 70 + a, 1 / (a + b) ** 2, sp.S.Zero], (a, b))
     found = kernel(Fraction, None, Fraction(3), Fraction(7))
     assert found == [Fraction(1, 3), Fraction(0.1) + Fraction(7, 3), 2**70 + 3, Fraction(1, 100), 0]
+
+
+def test_numbers_in_the_lagrangian_are_exact():
+    """One over 0.3 is not the rounded quotient, and 0.7 / 3 is a third of the number given."""
+    held = [v.subs(x, 0)]
+    string = cra.Model(
+        a * sp.Float(0.7) * v.diff(t) ** 2 / 2 - sp.Float(0.3) * v.diff(x) ** 2 / 2,
+        fields=[v], x=x, domain=(0, 0.1), t=t, essential=held,
+    )  # fmt: skip
+    one = bound(flint, string.numerics, {}, {"a": 1 / 3}, damped=False).exact
+    (_, (flexible, _), (mass, _), _) = one.spans[0].system.entries
+    exact = [Fraction(1) / Fraction(0.3), -Fraction(1 / 3) * Fraction(0.7), Fraction(0.1)]
+    assert [Fraction(int(q.p), int(q.q)) for q in (flexible[0], mass[1], one.spans[0].length)] == exact
 
 
 def test_a_matrix_is_its_numerators_and_denominators():
