@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from cra_sym import checks
 from cra_sym.analysis.modes import check_kind
 from cra_sym.analysis.nonlinear import nonlinear_modal_equations
-from cra_sym.model.excitations import Fluctuation, LagrangianTerms, Parametric
+from cra_sym.model.excitations import DirectForce, Fluctuation, Parametric
 from cra_sym.model.system import System
 from cra_sym.solvers.floquet import Oscillation
 from cra_sym.solvers.modal_polynomials import ModalPolynomials, TensorTerm, symmetrised
@@ -133,17 +133,22 @@ def forced(
     """
     whole = nonlinear_modal_equations(system, modes, zeta)
     found = _Collected()
-    amplitudes = _amplitudes(system, drive, {name for name, _ in whole.causes})
+    if (excitation is None) != (epsilon is None):
+        raise ValueError("excitation, epsilon: both or neither must be given")
+    direct: Sequence[DirectForce] = []
+    if excitation is not None:
+        checks.instance("excitation", excitation, Parametric)
+        direct = excitation.forces(system, modes)
+    beside = {name for name, _ in whole.causes} | {force.cause[0] for force in direct if force.cause is not None}
+    amplitudes = _amplitudes(system, drive, beside)
     numbers = [found.number(_rate(amplitudes.get(name, 0.0), order)) for name, order in whole.causes]
     for own, terms in ((found.energies, whole.polynomials.energies), (found.forces, whole.polynomials.forces)):
         own += [term._replace(causes=tuple(numbers[k] for k in term.causes)) for term in terms]
     _add_loads(found, system, modes, amplitudes)
-    if (excitation is None) != (epsilon is None):
-        raise ValueError("excitation, epsilon: both or neither must be given")
     if excitation is not None:
-        checks.instance("excitation", excitation, Parametric)
         size = checks.one_number("epsilon", epsilon, low=0.0, unit="1")
         _add_excitation(found, system, modes, excitation, size, small)
+        _add_direct(found, direct, amplitudes, size, small)
     polynomials = whole.polynomials
     equations = ModalPolynomials(polynomials.omega, polynomials.damping, tuple(found.energies), tuple(found.forces))
     return Forced(equations, tuple(found.waves))
@@ -196,9 +201,21 @@ def _add_excitation(
         if drive.momentum is not None:  # d/dt (g B q) comes from the Lagrangian g v B q, apart from a force g B' v
             found.energies.append(TensorTerm(drive.momentum.T, 1, 1, wave))
             found.forces.append(TensorTerm(-drive.momentum.T, 0, 1, wave))
-    if isinstance(excitation, LagrangianTerms):
-        for oscillation, times, force in excitation.forces(system, modes):
+
+
+def _add_direct(
+    found: _Collected,
+    direct: Sequence[DirectForce],
+    amplitudes: Mapping[str, float],
+    epsilon: float,
+    small: bool,
+) -> None:
+    """Add the forces of an excitation that act without any vibration, with the inputs that some multiply."""
+    for oscillation, times, force, cause in direct:
+        amplitude = 1.0 if cause is None else amplitudes.get(cause[0], 0.0)
+        if amplitude:
             wave = (found.number(_wave(oscillation, epsilon if times else 1.0, small and times)),)
+            wave += () if cause is None else (found.number(_rate(amplitude, cause[1])),)
             found.forces.append(TensorTerm(force, 0, 0, wave))
 
 

@@ -15,7 +15,7 @@ from cra_sym.model.conservative_part import beside, conservative_part, elastic_p
 from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, driven_spatial, pushed
 from cra_sym.model.energies import stress_route
 from cra_sym.model.energy_signs import leading, masses
-from cra_sym.model.excited import axial, fluctuating, fluctuation
+from cra_sym.model.excited import axial, fluctuating, fluctuating_loads, fluctuation
 from cra_sym.model.forms import form_of
 from cra_sym.model.held_motions import HeldMotions, moving_supports
 from cra_sym.model.held_motions import held_motions as motions_held
@@ -48,6 +48,7 @@ __all__ = [
     "driven_spatial",
     "elastic_part",
     "fluctuating",
+    "fluctuating_loads",
     "fluctuation",
     "geometry",
     "held_motions",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
@@ -16,6 +16,7 @@ from cra_sym.si import paired
 from cra_sym.solvers.floquet import Oscillation
 
 if TYPE_CHECKING:
+    from cra_sym.model.excited import SwungLoad
     from cra_sym.model.lagrangian import Model
 
 __all__ = ["AxialBase", "Drive", "Excitation", "Fluctuation", "LagrangianTerms", "Parametric", "TransverseBase"]
@@ -85,6 +86,40 @@ class Drive(NamedTuple):
     mass: Array | None = None
 
 
+class DirectForce(NamedTuple):
+    """A force on the modes that is proportional to an oscillation, and to an input if a cause is named.
+
+    Attributes
+    ----------
+    oscillation : Oscillation
+    small : bool
+        Whether it is proportional to epsilon.
+    force : ndarray, shape (..., modes)
+    cause : (str, int) or None
+        Name of a prescribed motion or force, and the order of its derivative by time.
+    """
+
+    oscillation: Oscillation
+    small: bool
+    force: Array
+    cause: tuple[str, int] | None
+
+
+def _direct(
+    system: System, modes: int, oscillation: Oscillation, swung: SwungLoad, *, small: bool, size: Array | float = 1.0
+) -> Iterator[DirectForce]:
+    """Yield a load on the modes; the derivative of a product by time is that of each factor."""
+    force = size * system.project(swung.load, modes)
+    if not swung.momentum:
+        yield DirectForce(oscillation, small, force, swung.cause)
+        return
+    turned, factor = oscillation.rate()
+    yield DirectForce(turned, small, factor * force, swung.cause)
+    if swung.cause is not None:
+        name, order = swung.cause
+        yield DirectForce(oscillation, small, force, (name, order + 1))
+
+
 _COSINE = Oscillation(1, "cos", 0)
 
 
@@ -94,6 +129,10 @@ class Parametric(Excitation):
     def drives(self, system: System, modes: int) -> list[Drive]:
         """Return the oscillating matrices between the first modes of the system's conservative part."""
         raise NotImplementedError
+
+    def forces(self, system: System, modes: int) -> list[DirectForce]:
+        """Return the forces that act without any vibration."""
+        return []
 
     def springs(self, system: System) -> list[str]:
         """Return the fluctuating stiffnesses of ends, if nothing else fluctuates; then statics keep the other modes."""
@@ -127,17 +166,15 @@ class LagrangianTerms(Parametric):
                 found.append(Drive(part.oscillation, **{name: form[name] for name in part.matrices.names}))
         return found
 
-    def forces(self, system: System, modes: int) -> list[tuple[Oscillation, bool, Array]]:
-        """Return (oscillation, whether proportional to epsilon, force on each mode (..., modes)) of direct forces."""
+    def forces(self, system: System, modes: int) -> list[DirectForce]:
+        """Return the forces that act without any vibration."""
         self._check(system)
-        found = []
-        for part in self._model.oscillating_terms:
-            if part.force is not None:
-                found.append((part.oscillation, part.small, system.project(part.force, modes)))
-            if part.momentum is not None:
-                oscillation, factor = part.oscillation.rate()
-                found.append((oscillation, part.small, factor * system.project(part.momentum, modes)))
-        return found
+        return [
+            force
+            for part in self._model.oscillating_terms
+            for swung in part.loads
+            for force in _direct(system, modes, part.oscillation, swung, small=part.small)
+        ]
 
     def _check(self, system: System) -> None:
         if system.model != self._model:
@@ -211,10 +248,6 @@ class Fluctuation(Parametric):
         totals: dict[str, Array] = {}
         used: dict[str, tuple[str, ...]] = {}
         for name, weight in self._fluctuating(system).items():
-            reason = "is not a parameter" if name not in system.values else system.numerics("fluctuation", name)
-            if reason:
-                known = ", ".join(n for n in system.values if not system.numerics("fluctuation", n))
-                raise ValueError(f"{self!r}: {name} {reason}; must be one of {known}")
             form, used[name] = system.numerics("fluctuating", name)
             other = next((n for n in used if n in used[name] or (name in used[n] and n != name)), None)
             if other is not None:
@@ -231,9 +264,31 @@ class Fluctuation(Parametric):
             totals["stiffness"] = totals["stiffness"] * (moving[..., :, None] & moving[..., None, :])
         return [Drive(_COSINE, **totals)]
 
+    def forces(self, system: System, modes: int) -> list[DirectForce]:
+        """Return the fluctuating forces, such as the weight of a mass and its inertia on a moving base."""
+        found = []
+        for name, weight in self._fluctuating(system).items():
+            value = np.asarray(system.values[name])
+            size = (np.asarray(weight) * np.where(np.isinf(value), 0.0, value))[..., None]
+            for swung in system.numerics("fluctuating_loads", name):
+                found += _direct(system, modes, _COSINE, swung, small=True, size=size)
+        return found
+
     def _fluctuating(self, system: System) -> dict[str, Value]:
-        """Return the weights, without those that are 0 and belong to no parameter of the model."""
-        return {name: weight for name, weight in self.weights.items() if name in system.values or np.any(weight)}
+        """Return the weights, without those that are 0 and belong to no parameter of the model.
+
+        Raises
+        ------
+        ValueError
+            Names the parameter that cannot fluctuate.
+        """
+        found = {name: weight for name, weight in self.weights.items() if name in system.values or np.any(weight)}
+        for name in found:
+            reason = "is not a parameter" if name not in system.values else system.numerics("fluctuation", name)
+            if reason:
+                known = ", ".join(n for n in system.values if not system.numerics("fluctuation", n))
+                raise ValueError(f"{self!r}: {name} {reason}; must be one of {known}")
+        return found
 
     def springs(self, system: System) -> list[str]:
         """Return the fluctuating stiffnesses if all of them are stiffnesses of an end."""

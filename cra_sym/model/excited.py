@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from sympy import Dummy, Expr, Heaviside, S, Symbol, integrate, sympify
+from sympy import Derivative, Dummy, Expr, Heaviside, S, Symbol, expand, integrate, sympify
+from sympy.core.function import AppliedUndef
 
 from cra_sym.mechanics.hamilton import HamiltonResult
 from cra_sym.mechanics.jets import END_NAMES, End, HamiltonError, Jet
@@ -21,10 +22,12 @@ if TYPE_CHECKING:
 
 __all__ = [
     "PeriodicForms",
+    "SwungLoad",
     "axial",
     "axial_load",
     "checked_small",
     "fluctuating",
+    "fluctuating_loads",
     "fluctuation",
     "periodic_forms",
     "refuse_small",
@@ -35,7 +38,25 @@ __all__ = [
 Options = dict[str, Any]
 Term = tuple[str, Expr, int | None, bool]
 Parts = dict[tuple[int, Key], Options]
+Cause = tuple[str, int] | None
 _TERMS = ("density", "left", "right")
+
+
+class SwungLoad(NamedTuple):
+    """A load that is proportional to an oscillation, and to an input if a cause is named.
+
+    Attributes
+    ----------
+    cause : (str, int) or None
+        Name of a prescribed motion or force, and the order of its derivative by time.
+    momentum : bool
+        Whether the derivative by time of that product acts, instead of the product.
+    load : Load
+    """
+
+    cause: tuple[str, int] | None
+    momentum: bool
+    load: Load
 
 
 class PeriodicForms(NamedTuple):
@@ -48,15 +69,13 @@ class PeriodicForms(NamedTuple):
         Whether they are proportional to epsilon.
     matrices : BilinearForm or None
         Stiffness, damping, momentum and mass, where they occur.
-    force, momentum : Load or None
-        Direct loads: one acts with the oscillation, the other with its time derivative.
+    loads : tuple of SwungLoad
     """
 
     oscillation: Oscillation
     small: bool
     matrices: BilinearForm | None
-    force: Load | None
-    momentum: Load | None
+    loads: tuple[SwungLoad, ...]
 
 
 # ------------------------------------------------------------------------------------- the Lagrangian's own terms
@@ -160,9 +179,9 @@ def periodic_forms(model: Model, parts: Mapping[tuple[int, Key], Options]) -> tu
             )
         weak = weak_form(model.linearised.variation)
         matrices = form_of(weak, named, model.symbols) if named else None
-        force, momentum = (_load(model, forms, order) for order in (0, 1))
-        if matrices or force or momentum:
-            found.append(PeriodicForms(oscillation, epsilons == 1, matrices, force, momentum))
+        swung = _loads(model, forms)
+        if matrices or swung:
+            found.append(PeriodicForms(oscillation, epsilons == 1, matrices, swung))
     return tuple(found)
 
 
@@ -189,11 +208,39 @@ def _highest(variation: Variation, number: int) -> Expr:
     return variation.space.form(jet)
 
 
-def _load(model: Model, forms: TimeForms, order: int) -> Load | None:
-    inside, ends = (
-        {jet: value for (jet, n), value in load.items() if n == order} for load in (forms.load, forms.discrete_load)
+def _loads(model: Model, forms: TimeForms) -> tuple[SwungLoad, ...]:
+    """Return the loads of periodic terms, apart by what else they are proportional to."""
+    weak = weak_form(model.linearised.variation)
+    groups: dict[tuple[Cause, bool], tuple[dict[Jet, Expr], dict[Jet, Expr]]] = {}
+    for side, given in enumerate((forms.load, forms.discrete_load)):
+        for (jet, order), whole in given.items():
+            for cause, value in _by_cause(weak.variation.space.restore(whole), weak.variation.space.t).items():
+                groups.setdefault((cause, order == 1), ({}, {}))[side][jet] = value
+    return tuple(
+        SwungLoad(cause, momentum, load_of(weak, inside, ends, model.symbols))
+        for (cause, momentum), (inside, ends) in groups.items()
     )
-    return load_of(weak_form(model.linearised.variation), inside, ends, model.symbols) if inside or ends else None
+
+
+def _by_cause(load: Expr, t: Symbol) -> dict[Cause, Expr]:
+    """Return the coefficients of a load by the input, and its derivative, that they multiply; None: by none.
+
+    Raises
+    ------
+    HamiltonError
+        Names a load that is not linear in the inputs.
+    """
+    given = expand(load.doit())
+    inputs = {node: Dummy() for node in given.atoms(Derivative)}
+    inputs |= {node: Dummy() for node in given.xreplace(inputs).atoms(AppliedUndef)}
+    linear = given.xreplace(inputs)
+    found: dict[Cause, Expr] = {None: linear.xreplace(dict.fromkeys(inputs.values(), S.Zero))}
+    for node, mark in inputs.items():
+        function, order = (node.expr, node.derivative_count) if isinstance(node, Derivative) else (node, 0)
+        found[function.func.__name__, int(order)] = linear.diff(mark)
+    if any(value.has(t, *inputs.values()) for value in found.values()):
+        raise HamiltonError(f"small: the load {load} must be linear in prescribed motions and forces")
+    return {cause: value for cause, value in found.items() if value != 0}
 
 
 # ------------------------------------------------------------------------------------------ fluctuating parameters
@@ -221,6 +268,12 @@ def fluctuating(model: Model, name: str) -> tuple[BilinearForm, tuple[str, ...]]
     used = sorted({symbol.name for value in values for symbol in value.free_symbols if isinstance(symbol, Symbol)})
     form = form_of(weak_form(variation), named, model.symbols)
     return form, tuple(name for name in used if name in {s.name for s in model.symbols})
+
+
+def fluctuating_loads(model: Model, name: str) -> tuple[SwungLoad, ...]:
+    """Return the loads that a unit of a parameter gives, such as the weight of a mass and its inertia on a base."""
+    variation = model.linearised.variation
+    return _loads(model, _derivative_by(variation, next(s for s in model.symbols if s.name == name)))
 
 
 def _derivative_by(variation: Variation, symbol: Symbol) -> TimeForms:

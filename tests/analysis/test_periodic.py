@@ -97,7 +97,7 @@ def test_a_lagrangian_says_what_is_periodic_in_it():
     drives = {drive.oscillation: drive.stiffness for drive in swaying.excitation.drives(system, 2)}
     np.testing.assert_allclose(drives[1, "cos", 0], 1.5 * np.outer(tip, tip), rtol=1e-12)
     np.testing.assert_allclose(drives[1, "sin", 0], -1.5 * np.sqrt(3) * np.outer(tip, tip), rtol=1e-12)
-    forces = {(wave, small): force for wave, small, force in swaying.excitation.forces(system, 2)}
+    forces = {(wave, small): force for wave, small, force, _ in swaying.excitation.forces(system, 2)}
     np.testing.assert_allclose(forces[(1, "cos", 0), False], 2.0 * tip, rtol=1e-12)
     # the momentum -m a varpi epsilon sin(2 varpi t): its rate is a force m a 2 varpi^2 epsilon cos(2 varpi t)
     place, weight = np.polynomial.legendre.leggauss(30)
@@ -754,3 +754,61 @@ def test_zones_of_one_damped_mass():
             for step in (0.01, -0.01)
         )  # the third order is of the size 10 * 0.1**3 / 8
         assert outside < 0 < inside
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_a_fluctuating_mass_feels_a_moving_base_and_its_weight(own):
+    """The inertia on the base did not fluctuate, and a Lagrangian that says so was refused with an internal error.
+
+    Against the periodic motion of an integrator: the start that comes back after a period.
+    """
+    q, w, push = (sp.Function(name)(t) for name in ("q", "w", "push"))
+    wave = 1 + epsilon * cos(varpi * t)
+    turned = 1 + epsilon * sin(varpi * t) if own else 1
+
+    def lagrangian(factor, other):
+        inertia = m * factor * ((q + w).diff(t) ** 2 / 2 - d * q)
+        return inertia - k * q**2 / 2 + push * other * q
+
+    given = {"left": lagrangian(wave if own else 1, turned), "small": SMALL if own else None}
+    block = cra.Model(0, fields=[], x=x, domain=(0, 1), t=t, coordinates=[q], prescribed=[w],
+                      virtual_work=[(-c * q.diff(t), q, None)], **given)  # fmt: skip
+    system = block.at({m: 1.0, k: 50.0, c: 0.5, d: 0.3})
+    rate, size, amplitude, force = 6.0, 0.3, 0.01, 0.2
+    ((state,),) = cra.steady_states(
+        system, [rate], excitation=block.excitation if own else cra.Fluctuation(m=1.0), epsilon=size,
+        drive={"w": amplitude, "push": force}, modes=1, harmonics=15,
+    )  # fmt: skip
+
+    def rates(time, y):
+        factor = 1 + size * np.cos(rate * time)
+        other = 1 + size * np.sin(rate * time) * own
+        speed = y[1] / factor + amplitude * rate * np.sin(rate * time)  # momentum m (q' + w')
+        return [speed, -50.0 * y[0] - 0.5 * speed - 0.3 * factor + force * other * np.cos(rate * time)]
+
+    def after(start, **more):
+        return solve_ivp(rates, (0.0, 2 * np.pi / rate), start, "DOP853", rtol=1e-11, atol=1e-13, **more).y
+
+    still = after([0.0, 0.0])[:, -1]
+    map_ = np.stack([after(unit)[:, -1] - still for unit in np.eye(2)], axis=-1)
+    start = np.linalg.solve(np.eye(2) - map_, still)
+    path = after(start, t_eval=np.linspace(0.0, 2 * np.pi / rate, 2001))[0]
+    assert state.amplitude == pytest.approx(np.abs(path).max(), rel=1e-5)  # of the samples: their distance squared
+    assert state.stable
+
+
+def test_an_input_in_oscillating_terms_alone_drives():
+    q, push = sp.Function("q")(t), sp.Function("push")(t)
+    energy = m * q.diff(t) ** 2 / 2 - k * q**2 / 2 + push * q * epsilon * cos(varpi * t)
+    block = cra.Model(0, fields=[], x=x, domain=(0, 1), t=t, coordinates=[q], left=energy, small=SMALL,
+                      virtual_work=[(-c * q.diff(t), q, None)]).at({m: 1.0, k: 50.0, c: 0.5})  # fmt: skip
+    ((state,),) = cra.steady_states(
+        block, [6.0], excitation=block.model.excitation, epsilon=0.3, drive={"push": 0.2}, modes=1, harmonics=3
+    )
+    still, swung = 0.03 / 50.0, 0.03 / abs(50.0 - 12.0**2 + 6.0j)  # cos^2 = 1/2 + cos(2 varpi t)/2
+    assert state.amplitude == pytest.approx(still + swung, rel=1e-9)
+    assert cra.growth_rate(block, block.model.excitation, 6.0, 0.3, 1) == 0.0
+    with pytest.raises(
+        ValueError, match=r"small: the load .*push\(t\)\*\*2.* must be linear in prescribed motions and"
+    ):
+        block.model.replace(left=energy + epsilon * cos(varpi * t) * q * push**2)
