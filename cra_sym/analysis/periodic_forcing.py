@@ -214,9 +214,9 @@ def _add_direct(
     for oscillation, times, force, cause in direct:
         amplitude = 1.0 if cause is None else amplitudes.get(cause[0], 0.0)
         if amplitude:
-            wave = (found.number(_wave(oscillation, epsilon if times else 1.0, small and times)),)
-            wave += () if cause is None else (found.number(_rate(amplitude, cause[1])),)
-            found.forces.append(TensorTerm(force, 0, 0, wave))
+            waves = [_wave(oscillation, epsilon if times else 1.0, small and times)]
+            waves += [] if cause is None else [_rate(amplitude, cause[1])]
+            found.forces.append(TensorTerm(force, 0, 0, tuple(found.number(wave) for wave in waves)))
 
 
 def _wave(oscillation: Oscillation, size: float, small: bool) -> Wave:

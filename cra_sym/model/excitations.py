@@ -266,7 +266,7 @@ class Fluctuation(Parametric):
 
     def forces(self, system: System, modes: int) -> list[DirectForce]:
         """Return the fluctuating forces, such as the weight of a mass and its inertia on a moving base."""
-        found = []
+        found: list[DirectForce] = []
         for name, weight in self._fluctuating(system).items():
             value = np.asarray(system.values[name])
             size = (np.asarray(weight) * np.where(np.isinf(value), 0.0, value))[..., None]
