@@ -124,8 +124,8 @@ def mode_shapes(
 ) -> Array | NDArray[np.complex128]:
     """Return the mass-normalised mode shapes (25), or their derivatives by x, positive at the right end.
 
-    Where the first field of a mode is zero at the right end, its first nonzero derivative there is positive; where all
-    are zero (a clamped right end), the field next to that end is positive.
+    Where the first field of a mode is zero at the right end, the next displacement of the section there, such as the
+    slope of a beam, is positive; where all are zero (a clamped beam, a held string), the field next to that end is.
 
     Parameters
     ----------

@@ -12,7 +12,8 @@ from cra_sym.analysis.complex_shapes import of_complex_modes
 from cra_sym.analysis.differences import by_differences, rates_by_moved_supports
 from cra_sym.analysis.eigenvalue_rates import eigenvalue_rates, mode_rates, with_next
 from cra_sym.analysis.eigenvalues import oscillating_frequencies
-from cra_sym.analysis.modes import checked_places, displaced, driver_of, participation, section_place
+from cra_sym.analysis.followed_points import FollowedPoints
+from cra_sym.analysis.modes import driver_of, participation
 from cra_sym.analysis.rates import Rates
 from cra_sym.cached import cached_property
 from cra_sym.checks import choice, count, default_floating_point, flag, instance, names
@@ -157,18 +158,10 @@ class Sensitivities:
         >>> bool(np.allclose(change, -mode_shapes(arm, 1.0, 2) / (2 * arm.rho)))  # the mass is normalised
         True
         """
-        place = section_place(self._system, field, lumped=True)
-        points, domain, share = checked_places(self._system, x, place), self._system.domain, None
-        if points is not None:
-            share = (np.atleast_1d(points) - column(domain.left)) / column(domain.length)
-
-        def at(system: System, modes: Modes) -> Array:
-            own = system.domain
-            there = None if share is None else column(own.left) + share * column(own.length)
-            return displaced(system, modes, place, there)
-
-        found = self._changed(name, at, flag("damped", damped))
-        return found if points is None or points.ndim else found[..., 0]
+        followed = FollowedPoints(self._system, x, field)
+        found, drift = self._changed(name, followed.shapes, flag("damped", damped)), followed.drift(name)
+        found = found if drift is None else found - self._here(followed.slopes, damped) * drift[..., None, :]
+        return found[..., 0] if followed.single else found
 
     def participation(self, name: str, motion: str | None = None) -> Array | Complex:
         """Return the derivatives of the participation factors by a parameter, shape (..., modes).
@@ -200,7 +193,7 @@ class Sensitivities:
     def _changed(self, name: str, quantity: Callable[[System, Modes], Array], damped: bool = False) -> Array | Complex:
         """Return the derivative of a linear quantity of the modes of shape (..., modes, ...)."""
         choice("name", name, self._by)
-        if (damped or self._is_complex) and not self._system.numerics("conservative"):
+        if self._by_complex_modes(damped):
             rates = mode_rates(self._system, name, self._eigenvalues, lambda one, s: of_complex_modes(one, s, quantity))
             return np.take(rates, np.arange(self._modes), axis=self.frequency.ndim - 1)
         watched = min(self._modes + 1, self._system.most_modes)  # the next mode may be close to the last one
@@ -214,6 +207,14 @@ class Sensitivities:
         found = np.where(np.broadcast_to(none, rigid.shape)[(..., *extra)], np.nan,
                          np.where(rigid[(..., *extra)], 0.0, found))  # fmt: skip
         return found.astype(complex) if damped else found
+
+    def _here(self, quantity: Callable[[System, Modes], Array], damped: bool) -> Array | Complex:
+        if not self._by_complex_modes(damped):
+            return quantity(self._system, self._system.modes(self._modes))
+        return of_complex_modes(self._system, self._eigenvalues[..., : self._modes], quantity)
+
+    def _by_complex_modes(self, damped: bool) -> bool:
+        return (damped or self._is_complex) and not self._system.numerics("conservative")
 
     @cached_property
     def _forms(self) -> Projected:
@@ -366,8 +367,7 @@ class Sensitivities:
             return value
         squared = self._squared(name)
         moves = np.abs(squared) > 1e-20 * np.abs(squared).max(axis=-1, keepdims=True)  # more than by rounding
-        several = self._still.sum(axis=-1, keepdims=True) > 1
-        directed = several & (moves & self._still).any(axis=-1, keepdims=True)
+        directed = ((self._still.sum(axis=-1) > 1) & (moves & self._still).any(axis=-1))[..., None]
         return np.where(self._still, np.where(directed, np.nan, np.where(moves & ~np.isnan(value), value, 0.0)), value)
 
     @cached_property

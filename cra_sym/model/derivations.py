@@ -11,6 +11,7 @@ from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
 from cra_sym.model.ball_problem import ball_layout, ball_problem
+from cra_sym.model.breaks import Breaks, breaks
 from cra_sym.model.conservative_part import beside, conservative_part, elastic_part, stiffness_beside
 from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, driven_spatial, pushed
 from cra_sym.model.energies import stress_route
@@ -67,6 +68,7 @@ __all__ = [
     "pushed",
     "rates",
     "route",
+    "section_breaks",
     "spatial",
     "stiffness_beside",
     "stiffness_beside_elastic",
@@ -93,6 +95,14 @@ def length_name(model: Model) -> str:
 def spatial(model: Model) -> SpatialProblem:
     """Return the conservative spatial problem, dampers left out."""
     return spatial_problem(model.conservative, model.symbols, model.equations.domain[0])
+
+
+def section_breaks(model: Model) -> Breaks | None:
+    """Return where coefficients along x jump and where interior terms are; None if there are neither."""
+    weak = weak_form(model.linearised.variation)
+    places = [point.place for point in weak.points]
+    along = [value for entry in weak.inside.values() for value in entry.values() if value.has(weak.variation.space.x)]
+    return breaks(along, weak.variation.space.x, model.symbols, places) if places or along else None
 
 
 def damped_spatial(model: Model) -> SpatialProblem:
