@@ -97,7 +97,7 @@ class ComplexShapes:
             np.zeros((*self.s.shape[:-1], 2 * self.s.shape[-1])),
             self.spatial,
             self.columns,
-            lambda _, x: np.concatenate([(states := self._states(x)).real, states.imag], axis=1),
+            lambda x: np.concatenate([(states := self._states(x)).real, states.imag], axis=1),
         )
 
     @cached_property

@@ -263,7 +263,8 @@ class GeneralRoute:
     def modes(self, values: Values, shape: tuple[int, ...], omega: Array) -> StateModes:
         """Return the modes of all the first frequencies."""
         columns = flat_columns(values, shape)
-        return StateModes(omega, self.spatial, columns, partial(self._states, columns))
+        z = omega.reshape(-1, omega.shape[-1]) ** 2
+        return StateModes(omega, self.spatial, columns, partial(self._states, columns, z))
 
     def _states(self, columns: Array, z: Array, x: Array) -> Array:
         """Return the state of every mode at places x (rows, stations), shape (rows, modes, stations, 2 n + m)."""
@@ -271,9 +272,6 @@ class GeneralRoute:
         for rows, left, problem in self.spatial.problems(columns):
             state[rows] = mode_states(problem, z[rows], problem.shares(x[rows], left))
         return state
-
-
-States = Callable[[Array, Array], Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,13 +285,13 @@ class StateModes:
     columns : ndarray, shape (parameters, rows)
         Parameters of the flat batch.
     states : callable
-        ``states(z, x)`` returns the states of the modes with omega^2 = z (rows, modes) at places x (rows, stations).
+        ``states(x)`` returns the states of all modes at places x (rows, stations), (rows, modes, stations, 2 n + m).
     """
 
     omega: Array
     spatial: SpatialProblem
     columns: Array
-    states: States
+    states: Callable[[Array], Array]
 
     @cached_property
     def _z(self) -> Array:
@@ -311,7 +309,7 @@ class StateModes:
     @cached_property
     def _overview(self) -> Array:
         """States at both ends and some places between, shape (rows, modes, stations, 2 n + m)."""
-        return self.states(self._z, overview_places(self.spatial, self._finite, len(self._z)))
+        return self.states(overview_places(self.spatial, self._finite, len(self._z)))
 
     @cached_property
     def _sign(self) -> Array:
@@ -340,7 +338,7 @@ class StateModes:
 
     def shape(self, place: int, derivative: int, x: Array) -> Array:
         """Return a derivative of a displacement of the section at places, shape (..., modes, stations)."""
-        x = np.broadcast_to(x, (*self.omega.shape[:-1], x.shape[-1])).reshape(len(self._z), -1)
+        x = np.broadcast_to(x, (*self.omega.shape[:-1], x.shape[-1])).reshape(len(self._z), x.shape[-1])
         row = self.spatial.derivative_row(place, derivative, self._z, x[:, None], self._finite)
         found = np.einsum("...i,...i->...", row, self._at(x))
         return np.asarray(found.reshape(*self.omega.shape, x.shape[-1]))
@@ -349,7 +347,7 @@ class StateModes:
         key = x.tobytes()
         kept: dict[bytes, Array] = self.__dict__.setdefault("_kept", {})
         if key not in kept:
-            found = self._signed(self.states(self._z, x))
+            found = self._signed(self.states(x))
             kept.clear()  # one set of stations at a time: those of a quadrature serve many forms
             kept[key] = found
         return kept[key]

@@ -38,7 +38,7 @@ from cra_sym.solvers.waves import (
     template,
 )
 from cra_sym.solvers.waves_count import Determinant
-from cra_sym.solvers.waves_modes import wave_states
+from cra_sym.solvers.waves_modes import WaveShapes
 from cra_sym.solvers.waves_rates import (
     Slopes,
     compiled_root_rates,
@@ -58,6 +58,7 @@ __all__ = ["Waves", "waves_route"]
 
 Array = NDArray[np.float64]
 _BLOCK = 8192  # parameter sets per block
+_SHAPES_BLOCK = 1024  # with several stations and modes each
 _NEAR = 1e-4  # relative distance of two roots below which their rates come from the modes
 _COST = 10  # cost of one root relative to one of a single wave number, to decide whether machine code pays
 
@@ -225,7 +226,10 @@ class Waves:
         problem, simple = self._covered(columns)
         if not simple.all():
             return self._general.modes(values, shape, omega)
-        return StateModes(omega, self.spatial, columns, partial(self._states, columns, problem))
+        z = omega.reshape(-1, omega.shape[-1]) ** 2
+        blocks = [slice(start, start + _SHAPES_BLOCK) for start in range(0, max(len(z), 1), _SHAPES_BLOCK)]
+        shapes = [WaveShapes(problem.take(block), z[block]) for block in blocks]
+        return StateModes(omega, self.spatial, columns, partial(self._states, columns, shapes))
 
     def _covered(self, columns: Array) -> tuple[UniformProblem, NDArray[np.bool_]]:
         """Return the problem, and for which sets its closed forms hold.
@@ -245,12 +249,12 @@ class Waves:
             raise ValueError(f"values: a motion of the lumped coordinates {names} alone has neither mass nor stiffness")
         return problem, np.asarray(simple & (problem.length > 0))
 
-    def _states(self, columns: Array, problem: UniformProblem, z: Array, x: Array) -> Array:
+    def _states(self, columns: Array, shapes: Sequence[WaveShapes], x: Array) -> Array:
         """Return the state of every mode at places x (rows, stations), shape (rows, modes, stations, 2 n + m)."""
         finite = np.where(np.isinf(columns), 0.0, columns)
-        _, left = self.spatial.geometry.function(*finite)
-        share = np.clip((x - np.broadcast_to(left, len(x))[:, None]) / problem.length[:, None], 0.0, 1.0)
-        found = wave_states(problem, z, share)
+        length, left = (np.broadcast_to(value, len(x))[:, None] for value in self.spatial.geometry.function(*finite))
+        share = np.split(np.clip((x - left) / length, 0.0, 1.0), range(_SHAPES_BLOCK, len(x), _SHAPES_BLOCK))
+        found = np.concatenate([some.states(there) for some, there in zip(shapes, share, strict=True)])
         n, m = len(self.order), self.structure.coordinates
         if self.carried is not None:
             carried = _rows_first(self.carried.function(*finite), len(x), (n, m), 0)

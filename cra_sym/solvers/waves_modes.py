@@ -7,10 +7,13 @@ derivative by z is by a complex step, without cancellation (Squire and Trapp, SI
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from cra_sym.cached import cached_property
 
 from . import waves_kernel, waves_three
 from .shapes import clusters
@@ -30,7 +33,7 @@ from .waves_count import (
 from .waves_problem import Floats, UniformProblem
 from .waves_structure import Structure
 
-__all__ = ["block_at", "block_integrals", "wave_states"]
+__all__ = ["WaveShapes", "block_at", "block_integrals"]
 
 kernel: Any = waves_kernel  # formulas of arrays and terms, without types
 three: Any = waves_three
@@ -52,57 +55,87 @@ _TINY = 1e-100
 _STEP = 1e-30  # of the lowest frequency of half a wave along the length
 
 
-def wave_states(problem: UniformProblem, z: Floats, share: Floats) -> Floats:
-    """Return the state (q, w, P) of every mode at the stations, mass-normalised; the sign is arbitrary.
+@dataclass(frozen=True, eq=False)
+class WaveShapes:
+    """Mode shapes, mass-normalised; the sign is arbitrary.
 
     Parameters
     ----------
     problem : UniformProblem
     z : ndarray, shape (rows, modes)
         Roots as `lowest_waves` gives them. Equal ones get independent, mass-orthogonal shapes.
-    share : ndarray, shape (rows, stations)
-        Distance from the left end in lengths, 0 to 1.
-
-    Returns
-    -------
-    ndarray, shape (rows, modes, stations, 2 n + m)
-        q in the order of the problem, lumped coordinates, then P.
     """
-    rows, modes = z.shape
-    row = np.repeat(np.arange(rows), modes)
-    place, joined = clusters(z)
-    structure = problem.structure
-    with np.errstate(all="ignore"):
-        k = problem.take(row).all_coefficients()
+
+    problem: UniformProblem
+    z: Floats
+
+    @np.errstate(all="ignore")
+    def states(self, share: Floats) -> Floats:
+        """Return the state (q, w, P) of every mode at stations, shape (rows, modes, stations, 2 n + m).
+
+        Parameters
+        ----------
+        share : ndarray, shape (rows, stations)
+            Distance from the left end in lengths, 0 to 1.
+
+        Returns
+        -------
+        ndarray
+            q in the order of the problem, lumped coordinates, then P.
+        """
+        structure = self.problem.structure
+        if not self.z.size:
+            return np.empty((*self.z.shape, share.shape[1], structure.moving))
+        null = self._factors
+        along = _columns(structure, self._coefficients(), self._roots, 2.0 * share[self._row] - 1.0)
+        even, odd = _parts(along, null[..., None])
+        q, force = displacements(structure, list(even), list(odd))
+        lumped = null.T[2 * structure.n : structure.moving, :, None]
+        lumped = np.broadcast_to(lumped, (structure.coordinates, *q[0].shape))
+        states = np.moveaxis(np.concatenate([q, lumped, force]), 0, -1)
+        size = np.abs(states).max(axis=(1, 2), keepdims=True, initial=0.0)
+        return np.where(np.abs(states) > _TINY_SHARE * size, states, 0.0).reshape(*self.z.shape, *states.shape[1:])
+
+    @property
+    def _row(self) -> NDArray[np.int64]:
+        return np.repeat(np.arange(len(self.z)), self.z.shape[1])
+
+    @property
+    def _roots(self) -> Floats:
+        return clusters(self.z)[1].ravel()
+
+    def _coefficients(self) -> Floats:
+        return self.problem.take(self._row).all_coefficients()
+
+    @cached_property
+    def _factors(self) -> Floats:
+        """The factors of the columns in every shape, shape (rows modes, places)."""
+        structure, (place, _) = self.problem.structure, clusters(self.z)
+        k, z = self._coefficients(), self._roots
         unit = lowest_branch(structure, k, 1.0)
         step = _STEP * np.where(np.isfinite(unit) & (unit > 0.0), unit, 1.0)
-        moved = joined.ravel() + 1j * step
-        columns = _columns(structure, k, moved, np.broadcast_to(_PLACES, (row.size, len(_PLACES))))
-        conditions = _conditions(structure, k, joined.ravel(), columns.real)
-        null = _null_vectors(conditions, _vanishing(structure, k, joined.ravel(), conditions), place.ravel())
-        mass = _mass(problem, row, columns[..., 0], step, null.shape[0] // modes)
-        null = _normalised(null.reshape(rows, modes, structure.places), place, mass).reshape(row.size, -1)
-        along = _columns(structure, k, moved, 2.0 * share[row] - 1.0).real
-    even, odd = _parts(along, null[..., None])
-    q, force = displacements(structure, list(even), list(odd))
-    lumped = np.broadcast_to(null.T[2 * structure.n : structure.moving, :, None], (structure.coordinates, *q[0].shape))
-    states = np.moveaxis(np.concatenate([q, lumped, force]), 0, -1)
-    size = np.abs(states).max(axis=(1, 2), keepdims=True, initial=0.0)
-    return np.where(np.abs(states) > _TINY_SHARE * size, states, 0.0).reshape(rows, modes, *states.shape[1:])
+        conditions = _conditions(
+            structure, k, z, _columns(structure, k, z, np.broadcast_to(_PLACES, (z.size, len(_PLACES))))
+        )
+        null = _null_vectors(conditions, _vanishing(structure, k, z, conditions), place.ravel())
+        ends = _columns(structure, k, z + 1j * step, np.ones((z.size, 1)))[..., 0]
+        mass = _mass(self.problem, self._row, ends, step, len(self.z))
+        null = _normalised(null.reshape(*self.z.shape, structure.places), place, mass)
+        return null.reshape(z.size, structure.places)
 
 
-def _columns(structure: Structure, k: Floats, z: Complexes, place: Floats) -> Complexes:
-    """Return E and O on all columns, shape (2, n, 2 n, roots, stations).
+def _columns(structure: Structure, k: Floats, z: Any, place: Floats) -> Any:
+    """Return E and O on all columns, real or complex as z, shape (2, n, 2 n, roots, stations).
 
     ``place`` is x in half lengths from mid-span, shape (roots, stations); each column is over its size at the ends.
     """
     n = structure.n
-    result = np.zeros((2, n, 2 * n, *place.shape), dtype=complex)
+    result = np.zeros((2, n, 2 * n, *place.shape), dtype=z.dtype)
     blocks = []
     for block, (a, b) in zip(structure.blocks, sections(structure, k[:, :, None], z[:, None]), strict=True):
         waves = block_waves(structure, block, a, b)
         size = block[1] - block[0]
-        found = np.empty((4 * size * size, *place.shape), dtype=complex)
+        found = np.empty((4 * size * size, *place.shape), dtype=z.dtype)
         place_of_kind = regime(_real(waves)) if size > 1 else 0.0
         for at, kind in enumerate(KINDS[size]):
             part = np.flatnonzero(np.broadcast_to(place_of_kind == at, (len(z), 1)))
@@ -233,7 +266,7 @@ def _vanishing(structure: Structure, k: Floats, z: Floats, conditions: Floats) -
         sign = np.random.default_rng(1).choice([-1.0, 1.0], (len(k), part.size))
         for side in (-1.0, 1.0):
             entries, root = k[:, part] * (1.0 + side * sign * ROUNDING), z[part] * (1.0 + side * ROOT_ERROR)
-            columns_there = _columns(structure, entries, root.astype(complex), places).real
+            columns_there = _columns(structure, entries, root, places)
             other = _conditions(structure, entries, root, columns_there)
             found[part] |= columns[part] <= np.abs(other - conditions[part]).max(axis=(1, 3))
     return found

@@ -15,6 +15,7 @@ from cra_sym.model.routes import GeneralRoute
 from cra_sym.model.waves import Waves
 from cra_sym.solvers.waves import lowest_waves, template
 from tests.solvers.wave_problems import INF
+from tests.systems import system as named
 
 x, t, L = sp.Symbol("x"), sp.Symbol("t"), sp.Symbol("L")
 v, w, phi, theta = (sp.Function(name)(x, t) for name in ("v", "w", "phi", "theta"))
@@ -105,6 +106,15 @@ def test_modes_are_those_of_the_dynamic_stiffness(name):
         np.testing.assert_allclose(
             ours.shape(field, 0, places), theirs.shape(field, 0, places), atol=1e-8 * size
         )  # roots to 1e-12, shapes to that over the distance of neighbours
+
+
+def test_modes_of_a_batch_are_found_block_by_block(monkeypatch):
+    monkeypatch.setattr("cra_sym.model.waves._SHAPES_BLOCK", 2)
+    tension, x = np.linspace(1.0, 60.0, 5), [0.0, 0.3, 1.2]
+    many = cra.mode_shapes(named("tensioned beam", T=tension), x, 2)
+    for one, shape in zip(tension, many, strict=True):
+        np.testing.assert_allclose(shape, cra.mode_shapes(named("tensioned beam", T=one), x, 2), rtol=1e-12, atol=1e-12)
+    assert cra.mode_shapes(named("tensioned beam", T=np.empty(0)), x, 2).shape == (0, 2, 3)
 
 
 @pytest.mark.parametrize("name", models())

@@ -7,7 +7,7 @@ import pytest
 
 from cra_sym.solvers.shapes import mode_states
 from cra_sym.solvers.waves import lowest_waves
-from cra_sym.solvers.waves_modes import wave_states
+from cra_sym.solvers.waves_modes import WaveShapes
 from tests.solvers.test_waves import (
     FREE,
     HELD,
@@ -45,7 +45,7 @@ def random_soft_beam(rng):
 def test_modes_are_orthonormal(seed, kind):
     problem = kind(np.random.default_rng(seed))
     z = lowest_waves(problem, 5)
-    states = wave_states(problem, z, np.concatenate([(NODES + 1) / 2, ENDS])[None])[0]
+    states = WaveShapes(problem, z).states(np.concatenate([(NODES + 1) / 2, ENDS])[None])[0]
     # close neighbours mix by the rounding of their roots over their distance
     close = np.min(np.diff(z[0]) / z[0, 1:]) + 1e-3
     size = 1.0 if kind is random_soft_beam else 1e2  # roots of three waves are good to 1e-13
@@ -58,7 +58,7 @@ def test_modes_meet_equations_and_end_conditions(seed):
     z, (e, o) = lowest_waves(problem, 4), positions(problem)
     step = 1e-3
     share = 0.4 + step * np.arange(-2, 3)
-    states = wave_states(problem, z, np.concatenate([share, ENDS, np.linspace(0.1, 0.9, 9)])[None])[0]
+    states = WaveShapes(problem, z).states(np.concatenate([share, ENDS, np.linspace(0.1, 0.9, 9)])[None])[0]
     system = np.zeros((4, 4, 4))
     system[np.ix_(range(4), o, e)] = problem.odd_by_even[0] + z[0, :, None, None] * problem.odd_by_even[1]
     system[np.ix_(range(4), e, o)] = problem.even_by_odd[0] + z[0, :, None, None] * problem.even_by_odd[1]
@@ -88,7 +88,7 @@ def test_modes_are_those_of_the_dynamic_stiffness(seed):
     if (z == 0.0).sum() > 1 or np.diff(z[0]).min() < 1e-3 * z[0, -1]:
         return
     share = np.linspace(0.0, 1.0, 7)[None]
-    found, other = wave_states(problem, z, share)[0], mode_states(stiffness(problem), z, share)[0]
+    found, other = WaveShapes(problem, z).states(share)[0], mode_states(stiffness(problem), z, share)[0]
     sign = np.sign((found[..., :2] * other[..., :2]).sum(axis=(1, 2)))[:, None, None]
     size = np.abs(found).max(axis=1, keepdims=True)
     np.testing.assert_allclose((found / size)[..., :2], (sign * other / size)[..., :2], atol=1e-7)
@@ -96,11 +96,11 @@ def test_modes_are_those_of_the_dynamic_stiffness(seed):
 
 def test_known_shapes():
     z = lowest_waves(beams(HELD), 3)
-    tip = wave_states(beams(HELD), z, ENDS[None])[0, :, :, 0]
+    tip = WaveShapes(beams(HELD), z).states(ENDS[None])[0, :, :, 0]
     np.testing.assert_allclose(np.abs(tip), [[0.0, 2.0]] * 3, atol=1e-12)
     share = np.linspace(0.0, 1.0, 9)[None]
     problem = beams(HINGED, HINGED, tension=1e7)
-    shape = wave_states(problem, lowest_waves(problem, 4), share)[0, :, :, 0]
+    shape = WaveShapes(problem, lowest_waves(problem, 4)).states(share)[0, :, :, 0]
     exact = np.sqrt(2.0) * np.sin(np.arange(1, 5)[:, None] * np.pi * share)
     np.testing.assert_allclose(shape * np.sign(shape[:, 1:2]), exact, atol=1e-12)
 
@@ -108,7 +108,7 @@ def test_known_shapes():
 def test_boundary_layers_of_a_stiff_cable():
     """Tension 1e8: the shape of a string but for layers of 1e-4 L at the ends, to which nothing overflows."""
     problem = beams(HELD, HELD, tension=1e8)
-    states = wave_states(problem, lowest_waves(problem, 2), np.array([[0.0, 0.25, 0.5, 1.0]]))[0]
+    states = WaveShapes(problem, lowest_waves(problem, 2)).states(np.array([[0.0, 0.25, 0.5, 1.0]]))[0]
     assert np.isfinite(states).all()
     np.testing.assert_allclose(np.abs(states[0, 1:3, 0]), [1.0, np.sqrt(2.0)], rtol=1e-3)
     np.testing.assert_allclose(states[:, [0, 3], :2], 0.0, atol=1e-12)
@@ -123,5 +123,5 @@ def test_rigid_and_equal_roots_have_orthogonal_shapes():
         beams((0.0, INF), tension=5.0),
         beams((0.0, 2.0), tension=5.0, right_mass=(0.7, 0.1), offset=-0.4),
     ):
-        states = wave_states(problem, lowest_waves(problem, 4), share)[0]
+        states = WaveShapes(problem, lowest_waves(problem, 4)).states(share)[0]
         np.testing.assert_allclose(inner_products(problem, states), np.eye(4), atol=1e-12)
