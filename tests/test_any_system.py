@@ -112,11 +112,10 @@ REFUSED |= {("identify_joint", name): "system: k_t must be the stiffness of an e
 NATURAL = ("natural_frequencies", "mode_shapes", "modal_parameters", "sweep")
 REFUSED |= {(of, name): "no natural modes, .*system.conservative_part" for of in NATURAL for name in TURNING}
 PIPE, SHAFT = TURNING
-REFUSED |= {("slow_flow_values", name): "gyroscopic terms .*use steady_states" for name in TURNING}
 REFUSED |= {("backbone", PIPE): "forces that follow the motion are neither"}
 # without dampers no ratio; the slow flow of a free mode has a decay alone; what leaves the pipe takes energy along
 ZERO = {("damping_ratios", name) for name in (*NAMES, SHAFT)} | {("slow_flow_values", name) for name in NAMES}
-ZERO |= {("growth_rate", PIPE)}
+ZERO |= {("growth_rate", PIPE), ("slow_flow_values", SHAFT)}
 # and a shaft that is as stiff across as upright couples no mode with itself: zones that the message says are none
 NO_ZONE = {("stability_boundary", PIPE): "below the threshold", ("stability_boundary", SHAFT): "does not couple"}
 

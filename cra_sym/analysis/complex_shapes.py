@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from cra_sym.model.vanishing import check_forces
 from cra_sym.solvers.lowest_motions import BasisModes, LowestMotions, lowest_motions
 from cra_sym.solvers.pencil import GeneralContinuum
 
-__all__ = ["of_complex_modes", "resonant_growth"]
+__all__ = ["of_complex_modes", "resonant_growth", "shapes_and_tests"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -48,7 +49,7 @@ def of_complex_modes(system: System, s: Complex, quantity: Callable[[System, Any
     found = []
     for values, column in zip(s.reshape(-1, s.shape[-1]), columns.T, strict=True):
         one = system.model.at(dict(zip(numerics("names"), column, strict=True)))
-        basis, own = _on_basis(system, column[:, None], values)
+        basis, own, _ = _on_basis(system, column[:, None], values)
         found.append(np.tensordot(own, quantity(one, basis), axes=1))
     return np.array(found, dtype=complex).reshape(*s.shape, *found[0].shape[1:])
 
@@ -86,13 +87,63 @@ def resonant_growth(system: System, motion: str, s: Complex, tip: Callable[[Syst
     return found
 
 
-def _on_basis(system: System, column: Array, s: Complex) -> tuple[BasisModes, Complex]:
-    """Return the coordinates of a basis, and in these the modes of one parameter set, shape (modes, coordinates)."""
+@dataclass(frozen=True, eq=False)
+class Combinations:
+    """Combinations of the coordinates of a basis, shape (number, coordinates), with the interface of modes."""
+
+    basis: BasisModes
+    shares: Array
+
+    @property
+    def omega(self) -> Array:
+        """Placeholder array with one entry each; only its shape is used."""
+        return np.zeros(len(self.shares))
+
+    def displacement(self, end: int, place: int) -> Array:
+        """Return a displacement of an end section, shape (number,)."""
+        return np.asarray(self.shares @ self.basis.displacement(end, place))
+
+    def force(self, end: int, place: int) -> Array:
+        """Raise: they have no natural forces of their own."""
+        raise NotImplementedError
+
+    def coordinate(self, number: int) -> Array:
+        """Return a lumped coordinate, shape (number,)."""
+        return np.asarray(self.shares @ self.basis.coordinate(number))
+
+    def shape(self, place: int, derivative: int, x: Array) -> Array:
+        """Return a derivative of a displacement at places, shape (number, stations)."""
+        return np.asarray(self.shares @ self.basis.shape(place, derivative, x))
+
+    def integral(self, place: int) -> None:
+        """Return None: only quadrature gives integrals."""
+        return None
+
+
+def shapes_and_tests(system: System, s: Complex) -> Combinations:
+    """Return the real parts of some complex modes, their imaginary parts, and these of the tests of the modes.
+
+    With forces f on the structure the amplitude of a mode obeys ``z' = s z + test . f``.
+
+    Parameters
+    ----------
+    system : System
+        Not a batch, with a stress basis.
+    s : ndarray of complex, shape (modes,)
+        Eigenvalues of the modes, some of the lowest.
+    """
+    basis, own, tests = _on_basis(system, flat_columns(system.parameters, ()), s)
+    return Combinations(basis, np.concatenate([own.real, own.imag, tests.real, tests.imag]))
+
+
+def _on_basis(system: System, column: Array, s: Complex) -> tuple[BasisModes, Complex, Complex]:
+    """Return the coordinates of a basis, and in these modes and tests of one parameter set, (modes, coordinates)."""
     spatial = system.numerics("damped_spatial")
     ((_, problem),) = system.numerics("pencil").problems(column)
     motions = _motions(problem, s)
     values, vectors = np.linalg.eig(motions.system)
-    own = motions.shapes @ vectors[:, [np.abs(values - one).argmin() for one in s]]
+    number = [np.abs(values - one).argmin() for one in s]
+    own, tests = motions.shapes @ vectors[:, number], (np.linalg.inv(vectors) @ motions.push)[number]
     basis = motions.basis
     energy = (np.abs(basis.problem.root_mass[0][:, None] * own) ** 2).sum(axis=0) / basis.problem.rate[0] ** 2
     ends = overview_places(spatial, np.where(np.isinf(column), 0.0, column), 1)[0]
@@ -102,7 +153,8 @@ def _on_basis(system: System, column: Array, s: Complex) -> tuple[BasisModes, Co
     seen = np.stack([part.T @ own for part in parts], axis=-1)
     still = np.array([one @ own for one in lumped]).reshape(len(lumped), len(s)).T
     turn = mode_sign(np.swapaxes(seen, 0, 1)[None], still[None])[0, :, 0]
-    return basis, np.asarray((turn / np.sqrt(energy) * own).T)
+    scale = (turn / np.sqrt(energy))[:, None]
+    return basis, scale * own.T, tests / scale
 
 
 def _motions(problem: GeneralContinuum, s: Complex) -> LowestMotions:

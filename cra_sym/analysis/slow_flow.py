@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from cra_sym import checks
+from cra_sym.analysis.complex_flow import complex_flow
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, nonlinear_modal_equations
 from cra_sym.model.system import System
 
@@ -25,6 +28,7 @@ def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = 
     Parameters
     ----------
     model : Model
+        Without natural modes (gyroscopic terms, forces that follow the motion) the modes are complex, see below.
     resonance : int or tuple
         ``n`` primary (varpi about omega_n); ``(n, n)``, ``(m, n)``, ``(m, -n)`` parametric (varpi about the sum or
         difference); ``('free', n)``; ``('superharmonic', n, k)`` (k varpi about omega_n); ``('subharmonic', n, k)``
@@ -44,6 +48,14 @@ def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = 
     ------
     ValueError
         Names the argument that is out of its range, or the term that is not polynomial.
+
+    Notes
+    -----
+    Complex modes are those of :func:`cra_sym.eigenvalues`, for a primary or an internal resonance and for free motions.
+    ``2 Re(phi A exp(i omega t))`` is their displacement, with the shapes phi of :func:`cra_sym.mode_shapes` with
+    ``damped``. Each is an oscillator, and the forces on it, of second and third degree, depend on displacements (first
+    number of ``Q21_1112``) and velocities (second number). The force f_n of a base that moves by w_1 at omega_n is
+    ``2 omega_n / abs(phi_n)`` at the tip times :func:`cra_sym.forced_width`.
 
     Examples
     --------
@@ -66,13 +78,22 @@ def slow_flow(model: Model, resonance: Any, order: int = 1, modes: int | None = 
         )
     from cra_sym.mechanics import free_vibration
     from cra_sym.mechanics import slow_flow as mechanics
-    from cra_sym.model.slow_coefficients import slow_coefficients
+    from cra_sym.model.slow_coefficients import slow_coefficients, slow_forces
 
     numbers = [abs(n) for n in (resonance if isinstance(resonance, tuple) else (resonance,)) if isinstance(n, int)]
     kind = resonance[0] if isinstance(resonance, tuple) and resonance and isinstance(resonance[0], str) else ""
     own = max(numbers[: {"internal": 2, "": 2}.get(kind, 1)], default=1)
     own = checks.count("resonance", own, high=MOST_NONLINEAR_MODES)
     total = own if modes is None else checks.count("modes", modes, low=own, high=MOST_NONLINEAR_MODES)
+    if model.numerics("conservative_part") is not None:
+        if kind not in ("free", "internal") and not isinstance(resonance, int):
+            raise ValueError(
+                f"resonance = {checks.shown(resonance)}: must be n, ('free', n) or ('internal', m, n, k) without "
+                "natural modes; for others use steady_states and response_curves"
+            )
+        if order != 1:
+            raise ValueError(f"order = {checks.shown(order)}: must be 1 without natural modes")
+        return mechanics.slow_flow(resonance, slow_forces(model.numerics("nonlinear"), total), total)
     if checks.count("order", order, high=2) == 2:
         coefficients = slow_coefficients(model.numerics("nonlinear"), total, degree=6)
         return free_vibration.free_vibration(resonance, coefficients, total)
@@ -110,14 +131,11 @@ def slow_flow_values(flow: SlowFlow, system: System) -> dict[Symbol, float]:
 
     checks.instance("flow", flow, SlowFlow)
     checks.instance("system", system, System)
-    if system.conservative_part is not system:
-        raise ValueError(
-            "system: gyroscopic terms or forces that follow the motion couple its modes at the lowest order, which a "
-            "slow flow leaves out; use steady_states, response_curves or backbone"
-        )
     found = sorted({s for e in flow.amplitude_equations for s in e.free_symbols}, key=str)
     numbers = [int(s.name[6:]) for s in found if s.name.startswith("omega_")]
     numbers += [n for c in flow.coefficients for n in c.indices]
+    if system.conservative_part is not system:
+        return _of_complex_modes(flow, found, system, max(numbers, default=1))
     equations = nonlinear_modal_equations(system, max(numbers, default=1)).polynomials
     values: dict[Symbol, float] = {}
     for symbol in found:
@@ -133,4 +151,29 @@ def slow_flow_values(flow: SlowFlow, system: System) -> dict[Symbol, float]:
             if (term.positions, term.velocities, term.causes) == (c.positions, c.velocities, ()):
                 entry = float(term.tensor[tuple(np.array(c.indices) - 1)])
         values[c.symbol] = entry / float(c.factor)
+    return values
+
+
+def _of_complex_modes(flow: SlowFlow, found: Sequence[Symbol], system: System, modes: int) -> dict[Symbol, float]:
+    """Return the values of the symbols of a flow of complex modes."""
+    if system.shape:
+        raise ValueError(
+            f"system has the batch shape {system.shape}: must be a single one here; see System.parameter_sets"
+        )
+    if np.any(system.zeta):
+        raise ValueError("zeta: must be 0 where modes are complex, which dampers of the model damp")
+    if system.numerics("pencil") is None:
+        raise ValueError("system: with a field that has no derivative by x there are no complex modes; eliminate it")
+    s, forces = complex_flow(system, modes)
+    values: dict[Symbol, float] = {}
+    for symbol in found:
+        name, _, number = symbol.name.partition("_")
+        if name in ("omega", "c"):
+            one = s[int(number) - 1]
+            values[symbol] = float(one.imag if name == "omega" else -one.real)
+    for c in flow.coefficients:
+        own = np.array(c.indices) - 1
+        own[1 + c.positions :] += modes  # velocities
+        orders = len(set(itertools.permutations(own[1:])))
+        values[c.symbol] = orders * float(forces[c.positions + c.velocities][tuple(own)])
     return values

@@ -14,10 +14,11 @@ from cra_sym.cached import cached_property
 from cra_sym.model.modal_matrices import modal_matrices
 from cra_sym.model.nonlinear import Factor, NonlinearTerms, Product
 from cra_sym.model.projection import Displacement, along, displaced
+from cra_sym.model.routes import Modes
 from cra_sym.model.system import System
 from cra_sym.solvers.modal_polynomials import ModalPolynomials, TensorTerm, symmetrised
 
-__all__ = ["ModalEquations", "modal_equations"]
+__all__ = ["ModalEquations", "modal_equations", "projected_terms"]
 
 Array = NDArray[np.float64]
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(10)
@@ -64,7 +65,9 @@ def modal_equations(system: System, modes: int, zeta: float | Array | None = Non
         raise ValueError(
             f"system has the batch shape {system.shape}: must be a single one here; see System.parameter_sets"
         )
-    energies, forces, causes, error = system.cached("nonlinear", modes, lambda n: _projected(system, n))
+    energies, forces, causes, error = system.cached(
+        "nonlinear", modes, lambda n: projected_terms(system, system.basis.modes(n))
+    )
     matrices = modal_matrices(system, modes)
     omega = matrices.omega
     ratios = np.broadcast_to(system.zeta if zeta is None else zeta, omega.shape)
@@ -79,13 +82,15 @@ def modal_equations(system: System, modes: int, zeta: float | Array | None = Non
     return ModalEquations(ModalPolynomials(omega, damping, energies, forces), causes, error)
 
 
-def _projected(
-    system: System, modes: int
+def projected_terms(
+    system: System, modes: Modes
 ) -> tuple[tuple[TensorTerm, ...], tuple[TensorTerm, ...], tuple[tuple[str, int], ...], float]:
+    """Return the tensors of the nonlinear energies and forces of modes or other motions, causes, and their error."""
     terms: NonlinearTerms | None = system.numerics("nonlinear")
     if terms is None:
         return (), (), (), 0.0
-    coarse, fine = (_Projection(system, modes, terms, panels) for panels in (2 * modes + 8, 3 * modes + 13))
+    number = modes.omega.shape[-1]
+    coarse, fine = (_Projection(system, modes, terms, panels) for panels in (2 * number + 8, 3 * number + 13))
     found, rough = fine.tensors(), coarse.tensors()
     error = 0.0
     for key, tensor in found.items():
@@ -104,8 +109,8 @@ Key = tuple[bool, int, int, tuple[int, ...]]
 class _Projection:
     """Terms integrated with one set of panels."""
 
-    def __init__(self, system: System, modes: int, terms: NonlinearTerms, panels: int) -> None:
-        self._system, self._modes, self._terms, self._n = system, system.basis.modes(modes), terms, modes
+    def __init__(self, system: System, modes: Modes, terms: NonlinearTerms, panels: int) -> None:
+        self._system, self._modes, self._terms, self._n = system, modes, terms, modes.omega.shape[-1]
         domain = system.domain
         self._values = [float(value) for value in domain.values]
         columns = np.array(self._values)[:, None]

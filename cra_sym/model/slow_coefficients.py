@@ -10,10 +10,23 @@ from sympy import Rational, Symbol
 from cra_sym.mechanics.amplitude_expansion import Coefficient
 from cra_sym.model.nonlinear import NonlinearTerms, Product
 
-__all__ = ["slow_coefficients"]
+__all__ = ["slow_coefficients", "slow_forces"]
 
 _NAMED = {(4, 0): ("K", Rational(-1, 2)), (2, 2): ("J", Rational(1, 2)), (3, 0): ("C", Rational(-1, 3))}
 _HIGHEST = 4  # highest degree in the Lagrangian that enters the first slow flow
+
+
+def slow_forces(terms: NonlinearTerms | None, modes: int) -> tuple[Coefficient, ...]:
+    """Return the symbols of forces on oscillators that stand for complex modes, of second and third degree."""
+    kinds = {kind for product in (*terms.inside, *terms.discrete) for kind in _kinds(terms, product)} if terms else ()
+    degrees = {p + v - int(not force) for force, p, v in kinds}
+    found = []
+    for whole in (2, 3) if 2 in degrees else (3,) if 3 in degrees else ():
+        for velocities in range(whole + 1):
+            for indices in _indices(modes, whole - velocities, velocities, force=True):
+                symbol = Symbol(f"Q{whole - velocities}{velocities}_{''.join(map(str, indices))}", real=True)
+                found.append(Coefficient(symbol, whole - velocities, velocities, indices, Rational(1), True))
+    return tuple(found)
 
 
 def slow_coefficients(terms: NonlinearTerms | None, modes: int, degree: int = 4) -> tuple[Coefficient, ...]:

@@ -209,8 +209,6 @@ def test_what_follows_the_motion_has_no_backbone():
     system = model.at({"g": 0.7, "k": 2.0, "k_3": 0.5, "n": 0.1})
     with pytest.raises(ValueError, match="follow the motion"):
         cra.backbone(system, 1, amplitude=0.1, modes=2)
-    with pytest.raises(ValueError, match="slow flow leaves out"):
-        cra.slow_flow_values(model.slow_flow(("free", 1)), system)
 
 
 def test_a_lumped_rotor_above_its_critical_speed():
