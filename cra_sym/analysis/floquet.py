@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from functools import cache
-from importlib.resources import files
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +10,8 @@ import numpy as np
 from cra_sym import checks
 from cra_sym.analysis.static_corrections import static_terms
 from cra_sym.kernels import Kernel, compiled, has_compiler
-from cra_sym.kernels.parts import wants_compiler
+from cra_sym.kernels.parts import Parts, wants_compiler
+from cra_sym.kernels.templates import template
 from cra_sym.model.excitations import Drive, Excitation, Fluctuation, Parametric, TransverseBase
 from cra_sym.model.modal_matrices import ModalMatrices, modal_matrices
 from cra_sym.model.system import MOST_MODES, System
@@ -89,8 +89,7 @@ def growth_rate(
     """
     found = _solver_arguments(system, excitation, angular_frequency, epsilon, modes, residual)
     if isinstance(found, tuple):
-        checks.choice("backend", backend, ("auto", "numpy"))
-        return periodic.growth_rate(*found, tolerance=tolerance)[()]
+        return periodic.growth_rate(*found, tolerance=tolerance, loop=_loop(backend, found))[()]
     return floquet.growth_rate(**found, tolerance=tolerance, loop=_loop(backend, found))[()]
 
 
@@ -139,8 +138,7 @@ def floquet_exponents(
     """
     found = _solver_arguments(system, excitation, angular_frequency, epsilon, modes, residual)
     if isinstance(found, tuple):
-        checks.choice("backend", backend, ("auto", "numpy"))
-        return periodic.floquet_exponents(*found, tolerance=tolerance)
+        return periodic.floquet_exponents(*found, tolerance=tolerance, loop=_loop(backend, found))
     return floquet.floquet_exponents(**found, tolerance=tolerance, loop=_loop(backend, found))
 
 
@@ -165,23 +163,30 @@ def batch_shape(system: Any, excitation: Excitation, **arrays: np.ndarray) -> tu
     return checks.broadcastable(system=np.empty(system.shape), excitation=np.empty(excitation.shape), **arrays)
 
 
-def _loop(backend: str, found: dict[str, Any]) -> floquet.Loop | None:
-    """Return the compiled loop of the Floquet solver if requested or worthwhile."""
+def _loop(backend: str, found: dict[str, Any] | tuple[Any, ...]) -> Any:
+    """Return the compiled loop of the solver of these arguments if requested or worthwhile."""
     checks.choice("backend", backend, ("auto", "numpy", "compiled"))
     if backend == "compiled" and not has_compiler():
         raise ValueError("backend = 'compiled': llvmlite is not installed; backend must be 'auto' or 'numpy'")
-    points = np.broadcast(found["angular_frequency"], found["epsilon"], found["omega"][..., 0]).size
-    compile = backend == "auto" and wants_compiler(_ROOTS * points, _template_parts)
-    return _template().kick_and_drift if compile or backend == "compiled" else None
+    if isinstance(found, tuple):
+        parts, of_one = _series_parts, [found[0][..., 0, 0], *found[3:]]
+    else:
+        parts, of_one = _splitting_parts, [found["omega"][..., 0], found["angular_frequency"], found["epsilon"]]
+    wanted = backend == "auto" and wants_compiler(_ROOTS * np.broadcast(*of_one).size, parts)
+    return _template(parts).propagate if wanted or backend == "compiled" else None
 
 
 @cache
-def _template() -> Any:
-    return compiled(*_template_parts())
+def _template(parts: Parts) -> Any:
+    return compiled(*parts())
 
 
-def _template_parts() -> tuple[str, dict[str, Kernel]]:
-    return files("cra_sym.solvers").joinpath("floquet_lanes.py").read_text(encoding="utf-8"), {}
+def _splitting_parts() -> tuple[str, dict[str, Kernel]]:
+    return template("cra_sym.solvers.floquet_lanes", {}), {}
+
+
+def _series_parts() -> tuple[str, dict[str, Kernel]]:
+    return template("cra_sym.solvers.taylor_lanes", {}), {}
 
 
 class Matrices(NamedTuple):

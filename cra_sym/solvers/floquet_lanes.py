@@ -7,7 +7,7 @@ This text is compiled by `cra_sym.kernels.compiled`. The batch axis is innermost
 import numpy as np
 
 
-def kick_and_drift(drifts, h, kicks, commutator, swings, coupling, compliance, epsilon, state):
+def propagate(drifts, h, kicks, commutator, swings, coupling, compliance, epsilon, state):
     """Propagate ``state`` in place; arguments as `cra_sym.solvers.floquet.Loop` has them."""
     stages, modes, points = kicks.size, coupling.shape[1], h.size
     total, weight = np.empty((modes, modes, points)), np.empty(points)

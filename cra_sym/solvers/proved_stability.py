@@ -27,7 +27,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.solvers.floquet import MOST_STEPS
-from cra_sym.solvers.periodic import PeriodicSystem, mass_and_inverse, propagated
+from cra_sym.solvers.periodic_systems import PeriodicSystem
+from cra_sym.solvers.taylor import mass_at_step, propagated
 
 __all__ = ["STABLE", "UNDECIDED", "UNSTABLE", "enclosed_monodromy", "multiplier_discs", "proved_stability"]
 
@@ -213,7 +214,7 @@ def _inverse_size(state: Array, error: Array) -> Array:
 
 def _residual(system: PeriodicSystem, step: int, steps: int) -> Array | float:
     """Return a bound of the residual of the inverse mass that a step uses, in the row norm."""
-    found = mass_and_inverse(system, step, steps)
+    found = mass_at_step(system, step, steps)
     if found is None:
         return 0.0
     mass, inverse = (np.moveaxis(part, -1, 0) for part in found)

@@ -418,14 +418,14 @@ def test_numbers_come_without_sympy_once_derived():
 def test_the_compiled_loop_is_numpys(decay):
     omega, coupling = np.array([1.0, 2.2]), np.array([[[1.0, 0.5], [0.5, -0.7]], [[0.1, 0.0], [0.0, 0.2]]])
     system = omega, coupling, np.linspace(0.7, 6.0, 70)[:, None], np.linspace(0.0, 0.6, 3), decay, [0.1, 0.3]
-    maps = [floquet.monodromy(*system, loop=loop) for loop in (growth._template().kick_and_drift, None)]
+    maps = [floquet.monodromy(*system, loop=loop) for loop in (growth._template(growth._splitting_parts).propagate, None)]
     np.testing.assert_allclose(*maps, rtol=1e-11, atol=1e-11)
 
 
 def test_charts_are_compiled_where_it_pays(monkeypatch):
     asked = []
     monkeypatch.setattr(growth, "wants_compiler", lambda roots, parts: bool(asked.append(roots)))
-    monkeypatch.setattr(growth, "_template", lambda: pytest.fail("nothing is to be compiled"))
+    monkeypatch.setattr(growth, "_template", lambda parts: pytest.fail("nothing is to be compiled"))
     arm, chart = cra.Arm.nominal().replace(k_t=1e3), (np.linspace(20.0, 90.0, 7)[:, None], np.linspace(0.0, 0.3, 3))
     one = cra.growth_rate(arm, cra.JointStiffness(), *chart, modes=2)
     assert asked == [21 * growth._ROOTS]

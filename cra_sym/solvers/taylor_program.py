@@ -1,0 +1,204 @@
+"""The series of :mod:`cra_sym.solvers.taylor` as a list of operations on vectors, for its compiled version.
+
+The vectors of one coefficient are q, p and the forces; u = dq/dt where the mass oscillates, else p is u; sums; and last
+the rows that are multiplied by the oscillations, which are kept for all later coefficients.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cra_sym.solvers.periodic_systems import PeriodicSystem
+from cra_sym.solvers.taylor import LEAST_ORDER, SHARE, factors, mass_and_inverse, step_coefficients
+
+__all__ = ["Loop", "Program"]
+
+Array = NDArray[np.float64]
+_SET, _ADD, _SERIES = 0, 1, 2  # a linear combination, set or added; with _SERIES a product of series
+_CACHED = 1 << 15  # numbers that a chunk of systems works on
+_ALIKE = 16  # the size of a chunk is a multiple of this, so that loops over all columns leave no rest for SIMD code
+_MOST = 1 << 22  # numbers of inverse masses that are given at a time
+
+
+class Loop(Protocol):
+    """The compiled loop."""
+
+    def __call__(
+        self,
+        kinds: NDArray[np.int64],
+        targets: NDArray[np.int64],
+        starts: NDArray[np.int64],
+        sources: NDArray[np.int64],
+        swings: NDArray[np.int64],
+        shared: NDArray[np.int64],
+        values: Array,
+        first_inverse: int,
+        inverse: Array,
+        kept: int,
+        rows: int,
+        moved: int,
+        waves: Array,
+        counts: NDArray[np.int64],
+        sizes: Array,
+        h: Array,
+        rate: Array,
+        limit: float,
+        least: int,
+        order: int,
+        chunk: int,
+        out: Array,
+    ) -> None:
+        """Write the maps over all steps to ``out``, shape (points, 2N, 2N).
+
+        Parameters
+        ----------
+        kinds, targets, swings : ndarray, shape (operations,)
+            What an operation does to its target: set it to a linear combination of vectors, or add that; set it to a
+            coefficient of the product of an oscillation, of this number, and the series of one vector, or add that.
+        starts : ndarray, shape (operations + 1,)
+            Where the entries of every operation start.
+        sources, shared : ndarray, shape (entries,)
+            The vector of an entry, and whether all systems have the same factor.
+        values : ndarray, shape (entries, points) or (entries, 1)
+            The factors.
+        first_inverse, inverse : int; ndarray, shape (steps, those entries, points)
+            The entries from ``first_inverse`` on are the inverse of the mass at the start of the step.
+        kept, rows, moved : int
+            Index of the first vector that is kept, number of these for each coefficient, index of the first one of u.
+        waves : ndarray, shape (steps, R, order)
+            Coefficients of the oscillations, of which the first ``counts`` are used.
+        sizes : ndarray, shape (R, points)
+        h, rate : ndarray, shape (points,)
+            Step, and the rate by which displacements are compared with momenta.
+        limit : float
+            Size of the next coefficient, relative to the state, at which a step ends; 0 for the whole order.
+        least, order : int
+            Number of coefficients that the first step is expected to take, and the largest number.
+        chunk : int
+            Number of systems that are propagated together, not more than there are.
+        """
+
+
+class Program:
+    """The operations of a batch of systems."""
+
+    def __init__(self, system: PeriodicSystem) -> None:
+        self.system, self.size = system, len(system.stiffness)
+        n = self.size
+        momenta = [factors(s.momentum, s.mass) for s in system.swings]
+        forces = [factors(s.stiffness, s.damping) for s in system.swings]
+        resisting, _, damping = factors(None, system.damping if system.damping.any() else None)
+        masses = [s.mass for s in system.swings if s.mass is not None]
+        self.moved = 3 * n if masses else n
+        self.sums = 4 * n if masses else 3 * n
+        self.kept = self.sums + sum(left.shape[1] for left, *_ in (*momenta, *forces) if left is not None)
+        self.kept += 0 if resisting is None else resisting.shape[1]
+        self.rows = 0
+        self.operations: list[tuple[int, int, int]] = []  # kind, target, oscillation
+        self.starts = [0]
+        self.entries: list[tuple[int, Array]] = []  # source, factor of one or of all systems
+        unknown = []  # rows without what u adds, which depends on them
+        for swing, (left, of_q, of_u) in enumerate(momenta):
+            unknown.append((self._rows((of_q, 0), (None if of_u is None else 0 * of_u, 0)), of_u))
+            self._multiply(swing, left, *unknown[-1][0], n, -1.0)
+        self.first_inverse, off = len(self.entries), ~np.eye(n, dtype=bool)[..., None]
+        self.inverse = np.zeros((n, n), bool)
+        if masses:
+            self.inverse |= any((m * off).any() for m in masses) | ~off[..., 0]
+            self._combine(_SET, self.moved, (np.where(self.inverse[..., None], np.nan, 0.0), n))
+        for (first, _), of_u in unknown:
+            self._combine(_ADD, first, (of_u, self.moved))
+        own = (damping, self.moved)
+        if resisting is not None:
+            self.sums += self._combine(_SET, self.sums, own)
+            own = (resisting, self.sums - resisting.shape[1])
+        self._combine(_SET, 2 * n, (system.stiffness, 0), own)
+        for swing, (left, of_q, of_u) in enumerate(forces):
+            self._multiply(swing, left, *self._rows((of_q, 0), (of_u, self.moved)), 2 * n, 1.0)
+
+    def _combine(self, kind: int, target: int, *matrices: tuple[Array | None, int]) -> int:
+        """Append products of matrices and the vectors from the given ones on; return their number of rows."""
+        there = [(matrix, first) for matrix, first in matrices if matrix is not None]
+        count = len(there[0][0]) if there else 0
+        for row in range(count):
+            for matrix, first in there:
+                columns = np.nonzero(matrix[row].any(axis=-1))[0]
+                self.entries += [(first + int(column), matrix[row, column]) for column in columns]
+            self._operate(kind, target + row)
+        return count
+
+    def _operate(self, kind: int, target: int, swing: int = 0) -> None:
+        self.operations.append((kind, target, swing))
+        self.starts.append(len(self.entries))
+
+    def _rows(self, *matrices: tuple[Array | None, int]) -> tuple[int, int]:
+        """Append rows that are kept; return the first one and their number."""
+        first = self.kept + self.rows
+        count = self._combine(_SET, first, *matrices)
+        self.rows += count
+        return first, count
+
+    def _multiply(self, swing: int, left: Array | None, first: int, count: int, target: int, sign: float) -> None:
+        """Append the product of an oscillation and the series of rows, times a left factor, added to the target."""
+        into, kind = (target, _ADD) if left is None else (self.sums, _SET)
+        for row in range(count):
+            self.entries.append((first + row, np.array([sign])))
+            self._operate(_SERIES + kind, into + row, swing)
+        if left is not None:
+            self._combine(_ADD, target, (left, self.sums))
+            self.sums += count
+
+    def maps(
+        self, index: NDArray[np.intp], rate: Array, steps: int, order: int, tolerance: float, *, half: bool, loop: Loop
+    ) -> Array:
+        """Return the maps of some of the systems over a period, or over half of it, shape (points, 2N, 2N)."""
+        system, number = self.system.take(index), steps // 2 if half else steps
+        rows = [
+            [step_coefficients(s.oscillation, step, steps, order - 1, SHARE * tolerance) for s in system.swings]
+            for step in range(number)
+        ]
+        counts = np.array([len(wave) for wave in rows[0]], dtype=np.int64)
+        waves = np.zeros((number, len(counts), order))
+        for step, row in enumerate(rows):
+            for swing, wave in enumerate(row):
+                waves[step, swing, : len(wave)] = wave
+        operations, sources = np.array(self.operations, dtype=np.int64).T, [source for source, _ in self.entries]
+        factors = [factor if factor.size == 1 else factor[index] for _, factor in self.entries]
+        points = max(factor.size for factor in factors)
+        inverse = np.empty((number, int(self.inverse.sum()), index.size))
+        if self.inverse.any():
+            for step, row in enumerate(rows):
+                found = mass_and_inverse(system, row)
+                assert found is not None
+                inverse[step] = found[1][self.inverse]
+        shared = np.array([factor.size == 1 for factor in factors], dtype=np.int64)
+        shared[self.first_inverse : self.first_inverse + inverse.shape[1]] = 0
+        out = np.empty((index.size, 2 * self.size, 2 * self.size))
+        numbers = 2 * self.size * (self.kept + order * self.rows)
+        loop(
+            *map(np.ascontiguousarray, operations[:2]),
+            np.array(self.starts),
+            np.array(sources),
+            np.ascontiguousarray(operations[2]),
+            shared,
+            np.array([np.broadcast_to(factor, points) for factor in factors]),
+            self.first_inverse,
+            inverse,
+            self.kept,
+            self.rows,
+            self.moved,
+            waves,
+            counts,
+            np.array([swing.size for swing in system.swings]),
+            system.period / steps,
+            rate,
+            tolerance / steps,
+            LEAST_ORDER,
+            order,
+            min(index.size, max(1, _CACHED // numbers // _ALIKE * _ALIKE)),
+            out,
+        )
+        return out
