@@ -10,13 +10,14 @@ import numpy as np
 from cra_sym import checks
 from cra_sym.analysis.static_corrections import static_terms
 from cra_sym.kernels import Kernel, compiled, has_compiler
-from cra_sym.kernels.parts import Parts, wants_compiler
+from cra_sym.kernels.parts import wants_compiler
 from cra_sym.kernels.templates import template
 from cra_sym.model.excitations import Drive, Excitation, Fluctuation, Parametric, TransverseBase
 from cra_sym.model.modal_matrices import ModalMatrices, modal_matrices
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.si import Numbers, paired
-from cra_sym.solvers import floquet, periodic
+from cra_sym.solvers import periodic
+from cra_sym.solvers.taylor_program import Loop
 
 __all__ = [
     "Matrices",
@@ -46,8 +47,7 @@ def growth_rate(
     """Return the growth rate of vibration: max(0, largest real part of the Floquet exponents).
 
     The motion is expanded in the first natural modes of the conservative part. Dampers, gyroscopic and follower forces
-    couple them, so that with such forces more modes may be needed. Where stiffness alone oscillates, as in (36a) and
-    (36b), and damping is modal, the method is that of :mod:`cra_sym.solvers.floquet`, else that of
+    couple them, so that with such forces more modes may be needed. The method is that of
     :mod:`cra_sym.solvers.periodic`.
 
     Parameters
@@ -88,9 +88,7 @@ def growth_rate(
     [0.    0.102 0.   ]
     """
     found = _solver_arguments(system, excitation, angular_frequency, epsilon, modes, residual)
-    if isinstance(found, tuple):
-        return periodic.growth_rate(*found, tolerance=tolerance, loop=_loop(backend, found))[()]
-    return floquet.growth_rate(**found, tolerance=tolerance, loop=_loop(backend, found))[()]
+    return periodic.growth_rate(*found, tolerance=tolerance, loop=_loop(backend, found))[()]
 
 
 @checks.default_floating_point
@@ -137,9 +135,7 @@ def floquet_exponents(
     array([ 0.0316, -0.0316])
     """
     found = _solver_arguments(system, excitation, angular_frequency, epsilon, modes, residual)
-    if isinstance(found, tuple):
-        return periodic.floquet_exponents(*found, tolerance=tolerance, loop=_loop(backend, found))
-    return floquet.floquet_exponents(**found, tolerance=tolerance, loop=_loop(backend, found))
+    return periodic.floquet_exponents(*found, tolerance=tolerance, loop=_loop(backend, found))
 
 
 def parametric(excitation: Any) -> Parametric:
@@ -163,29 +159,24 @@ def batch_shape(system: Any, excitation: Excitation, **arrays: np.ndarray) -> tu
     return checks.broadcastable(system=np.empty(system.shape), excitation=np.empty(excitation.shape), **arrays)
 
 
-def _loop(backend: str, found: dict[str, Any] | tuple[Any, ...]) -> Any:
-    """Return the compiled loop of the solver of these arguments if requested or worthwhile."""
+def _loop(backend: str, found: tuple[Any, ...]) -> Loop | None:
+    """Return the compiled loop of the solver if requested or worthwhile."""
     checks.choice("backend", backend, ("auto", "numpy", "compiled"))
     if backend == "compiled" and not has_compiler():
         raise ValueError("backend = 'compiled': llvmlite is not installed; backend must be 'auto' or 'numpy'")
-    if isinstance(found, tuple):
-        parts, of_one = _series_parts, [found[0][..., 0, 0], *found[3:]]
-    else:
-        parts, of_one = _splitting_parts, [found["omega"][..., 0], found["angular_frequency"], found["epsilon"]]
-    wanted = backend == "auto" and wants_compiler(_ROOTS * np.broadcast(*of_one).size, parts)
-    return _template(parts).propagate if wanted or backend == "compiled" else None
+    stiffness, _, _, frequency, epsilon, _ = found
+    points = np.broadcast(stiffness[..., 0, 0], frequency, epsilon).size
+    wanted = backend == "auto" and wants_compiler(_ROOTS * points, _template_parts)
+    loop: Loop | None = _template().propagate if wanted or backend == "compiled" else None
+    return loop
 
 
 @cache
-def _template(parts: Parts) -> Any:
-    return compiled(*parts())
+def _template() -> Any:
+    return compiled(*_template_parts())
 
 
-def _splitting_parts() -> tuple[str, dict[str, Kernel]]:
-    return template("cra_sym.solvers.floquet_lanes", {}), {}
-
-
-def _series_parts() -> tuple[str, dict[str, Kernel]]:
+def _template_parts() -> tuple[str, dict[str, Kernel]]:
     return template("cra_sym.solvers.taylor_lanes", {}), {}
 
 
@@ -247,28 +238,16 @@ def _refuse_rigid(system: System, excitation: Parametric) -> None:
 
 def _solver_arguments(
     system: System, excitation: Excitation, angular_frequency: Any, epsilon: Any, modes: int, residual: bool
-) -> dict[str, Any] | tuple[Any, ...]:
-    """Return the arguments of `cra_sym.solvers.floquet`, or else, as a tuple, those of `cra_sym.solvers.periodic`."""
+) -> tuple[Any, ...]:
+    """Return the arguments of `cra_sym.solvers.periodic`."""
     given, frequency, epsilon, modes = checked_point(system, excitation, angular_frequency, epsilon, modes)
-    matrices = matrices_of(system, given, modes)
-    if residual and not (isinstance(given, Fluctuation) and given.springs(system) and matrices.only_stiffness):
-        raise ValueError(
-            f"residual = True needs fluctuating stiffnesses of ends and no forces between modes, not {given!r}"
-        )
-    if not matrices.only_stiffness:
-        drives = [(d.oscillation, (d.stiffness, d.damping, d.momentum, d.mass)) for d in matrices.drives]
-        return matrices.stiffness, matrices.damping, drives, frequency, epsilon
-    found: dict[str, Any] = {
-        "omega": matrices.modal.omega,
-        "angular_frequency": frequency,
-        "epsilon": epsilon,
-        "decay": matrices.modal.decay,
-    }
+    matrices, compliance = matrices_of(system, given, modes), None
+    drives = [(d.oscillation, (d.stiffness, d.damping, d.momentum, d.mass)) for d in matrices.drives]
     if residual:
-        assert isinstance(given, Fluctuation)
-        found["coupling"], found["compliance"] = static_terms(system, given, modes)
-    else:
-        couplings = np.broadcast_arrays(*(d.stiffness for d in matrices.drives if d.stiffness is not None))
-        found["coupling"] = np.stack(couplings, axis=-3) if couplings else np.zeros((1, modes, modes))
-        found["oscillations"] = [d.oscillation for d in matrices.drives] or None
-    return found
+        if not (isinstance(given, Fluctuation) and given.springs(system) and matrices.only_stiffness):
+            raise ValueError(
+                f"residual = True needs fluctuating stiffnesses of ends and no forces between modes, not {given!r}"
+            )
+        coupling, compliance = static_terms(system, given, modes)
+        drives = [(matrices.drives[0].oscillation, (part, None, None, None)) for part in np.moveaxis(coupling, -3, 0)]
+    return matrices.stiffness, matrices.damping, drives, frequency, epsilon, compliance

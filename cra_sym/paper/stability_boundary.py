@@ -96,10 +96,12 @@ def prove_damping_threshold() -> Proof:
 @samples("49b")
 def sample_damping_threshold() -> bool:
     """The Floquet multipliers of one mode in the middle of its zone, just below and just above."""
-    from cra_sym.solvers.floquet import floquet_exponents
+    from cra_sym.solvers.floquet import Oscillation
+    from cra_sym.solvers.periodic import floquet_exponents
 
     numbers = {omega_n: 1.0, P_nn: 1.0, zeta_n: 0.005}
     threshold = float(damping_threshold().rhs.subs(numbers))
     sizes = threshold * np.array([0.995, 1.005])
-    below, above = floquet_exponents([1.0], [[[1.0]]], 2.0 - sizes**2 / 32, sizes, 0.005)[:, 0].real
+    drives = [(Oscillation(1, "cos", 0), ([[1.0]], None, None, None))]
+    below, above = floquet_exponents([[1.0]], [[0.01]], drives, 2.0 - sizes**2 / 32, sizes)[:, 0].real
     return bool(below < 0 < above)

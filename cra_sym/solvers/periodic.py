@@ -142,10 +142,11 @@ def _majorants(system: PeriodicSystem, rate: Array, blocks: Sequence[NDArray[np.
         return np.asarray(found)
 
     inverse = 1.0 / np.maximum(1.0 - largest.mass.sum(axis=0), LIGHTEST)
-    stiffness = series(largest.stiffness, largest.still[0]) * (period / unit) ** 2
+    stiffness = series(largest.stiffness, largest.still[0], _softened(waves, largest.softness)) * (period / unit) ** 2
     damping = series(largest.damping, largest.still[1]) * period / unit
     momentum = series(largest.momentum) * period / unit
-    mass = series(largest.mass, waves=np.where(k[:, None, None] % 2 == 0, waves, 0.0))
+    even = np.where(k[:, None, None] % 2 == 0, waves, 0.0)
+    mass = series(largest.mass, waves=even)
     scale = np.sqrt(np.maximum(stiffness[0], np.finfo(float).tiny) / inverse)
     q, u, p = np.ones((3, count, len(blocks)))
     for n in range(count - 1):
@@ -156,6 +157,22 @@ def _majorants(system: PeriodicSystem, rate: Array, blocks: Sequence[NDArray[np.
         pushed = (stiffness[: n + 1] * q[n::-1]).sum(axis=0) / scale + (damping[: n + 1] * u[n::-1]).sum(axis=0)
         q[n + 1], p[n + 1] = scale * u[n] / (n + 1), pushed / (n + 1)
     return np.asarray(np.log(np.maximum(np.maximum(q, p), np.finfo(float).tiny)) + k[:, None] * np.log(unit))
+
+
+def _softened(waves: Array, softness: Array) -> Array:
+    """Return bounds of the coefficients of oscillations in series with a flexibility, shape (orders, R, blocks).
+
+    That makes a fraction, which is not an entire function: hyperbolic cosines bound its denominator, as for masses.
+    """
+    if not softness.any():
+        return waves
+    found = np.array(np.broadcast_to(waves, (len(waves), *softness.shape)))
+    least = np.maximum(1.0 - softness, LIGHTEST)
+    for k in range(len(waves)):
+        for j in range(2, k + 1, 2):
+            found[k] += softness * waves[j] * found[k - j]
+        found[k] /= least
+    return found
 
 
 def _cheapest(series: Array, tolerance: float) -> tuple[int, int]:

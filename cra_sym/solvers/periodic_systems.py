@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ __all__ = ["LIGHTEST", "PeriodicSystem", "Sizes", "Swing"]
 Array = NDArray[np.float64]
 LIGHTEST = 1e-3
 """Least share of the mass that remains, in estimates."""
+_Four: TypeAlias = tuple[Array | None, Array | None, Array | None, Array | None]
 _SAME = 1e-14
 """Relative size of off-diagonal entries below which a matrix counts as diagonal."""
 
@@ -31,6 +32,8 @@ class Swing:
         epsilon times the power of varpi.
     stiffness, damping, momentum, mass : ndarray or None
         K_r, C_r, B_r, M_r.
+    compliance : ndarray, shape (points,), optional
+        lambda_r, of a term whose only matrix is the stiffness.
     """
 
     oscillation: Oscillation
@@ -39,6 +42,7 @@ class Swing:
     damping: Array | None
     momentum: Array | None
     mass: Array | None
+    compliance: Array | None = None
 
     @property
     def only_stiffness(self) -> bool:
@@ -48,7 +52,9 @@ class Swing:
     def take(self, index: NDArray[np.intp]) -> Swing:
         """Return some of the systems."""
         matrices = (self.stiffness, self.damping, self.momentum, self.mass)
-        return Swing(self.oscillation, self.size[index], *(_some(matrix, index) for matrix in matrices))
+        k, c, b, m = (_some(matrix, index) for matrix in matrices)
+        soft = None if self.compliance is None else self.compliance[index]
+        return Swing(self.oscillation, self.size[index], k, c, b, m, soft)
 
 
 @dataclass(frozen=True)
@@ -76,6 +82,7 @@ class PeriodicSystem:
         drives: Sequence[tuple[Oscillation, Sequence[Any]]],
         angular_frequency: Any,
         epsilon: Any,
+        compliance: Any = None,
     ) -> tuple[PeriodicSystem, tuple[int, ...]]:
         """Return the batch and its shape.
 
@@ -86,11 +93,16 @@ class PeriodicSystem:
             Matrices (..., N, N) or None.
         angular_frequency, epsilon : array_like, shape (...)
             varpi, rad/s, positive; epsilon.
+        compliance : array_like, shape (..., R), optional
+            lambda_r of each drive, whose only matrix is then the stiffness.
         """
+        soft = np.zeros(0) if compliance is None else np.asarray(compliance, float)
         given = [np.asarray(m, float) for m in (stiffness, damping)]
         some = [np.asarray(m, float) for _, matrices in drives for m in matrices if m is not None]
         varpi, epsilon = np.asarray(angular_frequency, float), np.asarray(epsilon, float)
-        shape = np.broadcast_shapes(*(m.shape[:-2] for m in (*given, *some)), varpi.shape, epsilon.shape)
+        shape = np.broadcast_shapes(
+            *(m.shape[:-2] for m in (*given, *some)), varpi.shape, epsilon.shape, soft.shape[:-1]
+        )
 
         def columns(matrix: Any) -> Array | None:
             if matrix is None:
@@ -100,11 +112,21 @@ class PeriodicSystem:
             return matrix.reshape(*matrix.shape[-2:], 1) if single else flat(matrix, shape, 2)
 
         frequency, size = flat(varpi, shape, 0), flat(epsilon, shape, 0)
-        swings = tuple(Swing(wave, size * frequency**wave.power, *map(columns, m)) for wave, m in _joined(drives))
+        waves = _joined(drives) if compliance is None else drives
+        swings = tuple(
+            Swing(
+                wave,
+                size * frequency**wave.power,
+                *cast(_Four, tuple(map(columns, matrices))),
+                None if compliance is None else flat(soft[..., r], shape, 0),
+            )
+            for r, (wave, matrices) in enumerate(_in_phase(waves))
+        )
         whole = [columns(matrix) for matrix in given]
         assert whole[0] is not None and whole[1] is not None
         batch = cls(whole[0], whole[1], swings, 2 * np.pi / frequency)
         batch.check_mass()
+        batch.check_compliance()
         return batch, shape
 
     def take(self, index: NDArray[np.intp]) -> PeriodicSystem:
@@ -124,6 +146,16 @@ class PeriodicSystem:
                 f"epsilon: the mass fluctuates by {total.max():.3g} times itself; must be less than once, so that it "
                 "stays positive"
             )
+
+    def check_compliance(self) -> None:
+        """Raise an error if the stiffness in series may vanish within the period."""
+        for swing in self.swings:
+            if swing.compliance is not None and (np.abs(swing.size * swing.compliance) >= 1.0).any():
+                raise ValueError(
+                    f"epsilon: a spring that fluctuates by {np.abs(swing.size).max():.3g} times itself and the static "
+                    "flexibility of the omitted modes cancel each other within the period; must be less, or take more "
+                    "modes"
+                )
 
     def parity(self) -> NDArray[np.int8] | None:
         """Return signs of q by which the first half of a period gives the second, None if there are none.
@@ -209,6 +241,7 @@ class PeriodicSystem:
             Swing(
                 *(s.oscillation, s.size, some(s.stiffness), some(s.damping), some(s.momentum)),
                 None if s.mass is None else one * turned(s.mass),
+                s.compliance,
             )
             for s in self.swings
         )
@@ -222,7 +255,8 @@ class PeriodicSystem:
         light = 1.0 / np.maximum(1.0 - sizes.mass.sum(axis=0), LIGHTEST)
         own, swung = sizes.still, sizes.damping.sum(axis=0) + sizes.momentum.sum(axis=0)
         turns = max((s.oscillation.order for s in self.swings), default=1)
-        moved = np.sqrt((own[0] + sizes.stiffness.sum(axis=0)) * light) + (own[1] + swung) * light
+        swung_stiffness = (sizes.stiffness / np.maximum(1.0 - sizes.softness, LIGHTEST)).sum(axis=0)
+        moved = np.sqrt((own[0] + swung_stiffness) * light) + (own[1] + swung) * light
         return np.asarray(moved + 2 * np.pi * turns / self.period)
 
     def sizes(self) -> Sizes:
@@ -234,17 +268,23 @@ class PeriodicSystem:
             found = [np.abs(s.size) * np.broadcast_to(norm_bound(getattr(s, name)), points) for s in self.swings]
             return np.array(found).reshape(len(self.swings), points)
 
-        return Sizes(still, *(rows(name) for name in ("stiffness", "damping", "momentum", "mass")))
+        softness = [np.zeros(points) if s.compliance is None else np.abs(s.size * s.compliance) for s in self.swings]
+        soft = np.array(softness).reshape(len(self.swings), points)
+        return Sizes(still, rows("stiffness"), rows("damping"), rows("momentum"), rows("mass"), soft)
 
 
 class Sizes(NamedTuple):
-    """Norms of a batch: ``still`` of K and C, shape (2, points); of the oscillating matrices one row per term."""
+    """Norms of a batch: ``still`` of K and C, shape (2, points); of the oscillating matrices one row per term.
+
+    ``softness`` is the largest of lambda_r times epsilon times the oscillation.
+    """
 
     still: Array
     stiffness: Array
     damping: Array
     momentum: Array
     mass: Array
+    softness: Array
 
 
 def _joined(
@@ -258,6 +298,13 @@ def _joined(
             if matrix is not None:
                 sums[k] = matrix if sums[k] is None else np.asarray(sums[k]) + matrix
     return list(found.items())
+
+
+def _in_phase(drives: Sequence[tuple[Oscillation, Any]]) -> list[tuple[Oscillation, Any]]:
+    """Return sines of one frequency as cosines, a quarter of a period later, which are even in time."""
+    if {wave.kind for wave, _ in drives} == {"sin"} and len({wave.order for wave, _ in drives}) == 1:
+        return [(wave._replace(kind="cos"), matrices) for wave, matrices in drives]
+    return list(drives)
 
 
 def _some(matrix: Array | None, index: NDArray[np.intp]) -> Array | None:

@@ -15,9 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cra_sym.solvers.floquet import Oscillation
-from cra_sym.solvers.periodic_systems import PeriodicSystem
+from cra_sym.solvers.periodic_systems import PeriodicSystem, Swing
 
-__all__ = ["LEAST_ORDER", "SHARE", "factors", "mass_and_inverse", "mass_at_step", "propagated", "step_coefficients"]
+__all__ = [
+    "LEAST_ORDER",
+    "SHARE",
+    "factors",
+    "mass_and_inverse",
+    "mass_at_step",
+    "propagated",
+    "step_coefficients",
+    "swing_coefficients",
+]
 
 Array = NDArray[np.float64]
 LEAST_ORDER = 6
@@ -48,6 +57,23 @@ def step_coefficients(wave: Oscillation, step: int, steps: int, order: int, leas
     return np.asarray(np.array([np.cos(phase), -np.sin(phase), -np.cos(phase), np.sin(phase)])[k % 4] * factors)
 
 
+def swing_coefficients(swing: Swing, step: int, steps: int, order: int, least: float = 0.0) -> Array:
+    r"""Return the coefficients of an oscillation w, or, shape (order + 1, points), of :math:`w / (1 + \lambda s w)`.
+
+    That with a compliance, s being the size.
+    """
+    wave = step_coefficients(swing.oscillation, step, steps, order, least)
+    if swing.compliance is None:
+        return wave
+    soft = swing.compliance * swing.size
+    found = np.zeros((order + 1, soft.size))
+    for k in range(order + 1):
+        here = wave[1 : k + 1, None]
+        found[k] = (wave[k] if k < len(wave) else 0.0) - soft * (here * found[k - len(here) : k][::-1]).sum(axis=0)
+        found[k] /= 1.0 + soft * wave[0]
+    return found
+
+
 class _Series:
     """Taylor coefficients of q, dq/dtau and p over one step, by recursion.
 
@@ -75,7 +101,7 @@ class _Series:
     def advanced(self, step: int, state: Array) -> Array:
         """Return the state (q, p) at the end of a step."""
         size, least = len(self.system.stiffness), SHARE * self.tolerance
-        waves = [step_coefficients(s.oscillation, step, self.steps, self.order, least) for s in self.system.swings]
+        waves = [swing_coefficients(s, step, self.steps, self.order, least) for s in self.system.swings]
         terms = [(wave, swing.size) for wave, swing in zip(waves, self.system.swings, strict=True)]
         found = mass_and_inverse(self.system, waves)
         mass = None if found is None else found[1]
@@ -167,8 +193,10 @@ class _Product:
             return
         count = min(last + 1, len(wave))
         part = self.rows[last + 1 - count : last + 1]
-        # BLAS takes no vector that runs backwards
-        found = (wave[:count][::-1].copy() @ part.reshape(count, -1)).reshape(part.shape[1:])
+        if wave.ndim > 1:
+            found = np.einsum("kp,krcp->rcp", wave[:count][::-1], part)
+        else:  # BLAS takes no vector that runs backwards
+            found = (wave[:count][::-1].copy() @ part.reshape(count, -1)).reshape(part.shape[1:])
         found *= size
         out += found if self.left is None else _applied(self.left, found)
 

@@ -24,6 +24,8 @@ def propagate(
     waves,
     counts,
     sizes,
+    soft_rows,
+    soft,
     h,
     rate,
     limit,
@@ -39,6 +41,7 @@ def propagate(
     own_sizes, state = np.empty((len(sizes), width)), np.empty((columns, width))
     vectors, total = np.empty((kept + order * rows, width)), np.empty(width)
     start, ratio = np.empty(width), np.empty(width)
+    own_soft, softened = np.empty((len(soft), width)), np.empty((len(soft), order, width))
     done = 0
     while done < h.size:
         first = min(done, h.size - chunk)
@@ -51,6 +54,8 @@ def propagate(
         _spread(rate, first, chunk, own_rate)
         for r in range(len(sizes)):
             _spread(sizes[r], first, chunk, own_sizes[r])
+        for r in range(len(soft)):
+            _spread(soft[r], first, chunk, own_soft[r])
         for i in range(columns):
             for j in range(columns):
                 for k in range(chunk):
@@ -59,6 +64,9 @@ def propagate(
         for step in range(len(waves)):
             for e in range(inverse.shape[1]):
                 _spread(inverse[step, e], first, chunk, own[first_inverse + e])
+            for r in range(len(soft_rows)):
+                if soft_rows[r] >= 0:
+                    _soften(waves[step, r], own_soft[soft_rows[r]], softened[soft_rows[r]])
             for i in range(columns):
                 for k in range(width):
                     vectors[i, k] = state[i, k]
@@ -72,7 +80,10 @@ def propagate(
                         _combine(own, shared, sources, starts[o], starts[o + 1], kinds[o], vectors, kept, shift, target)
                     else:
                         r, e = swings[o], starts[o]
-                        _series(vectors, rows, sources[e], term, waves[step, r], counts[r], total)
+                        if soft_rows[r] < 0:
+                            _series(vectors, rows, sources[e], term, waves[step, r], counts[r], total)
+                        else:
+                            _soft_series(vectors, rows, sources[e], term, softened[soft_rows[r]], total)
                         _scale(total, own[e, 0], own_sizes[r], kinds[o] - 2, target)
                 term += 1
                 for i in range(size):
@@ -185,6 +196,31 @@ def _series(vectors, rows, source, term, wave, count, total):
         for k in range(total.size):
             total[k] += (a * p[k] + b * q[k]) + (c * r[k] + d * s[k])
         j += 4
+
+
+def _soften(wave, soft, out):
+    """Set the coefficients of a wave w to those of w / (1 + soft w)."""
+    for j in range(len(out)):
+        row = out[j]
+        for k in range(soft.size):
+            row[k] = 0.0
+        for i in range(1, j + 1):
+            a, before = wave[i], out[j - i]
+            for k in range(soft.size):
+                row[k] += a * before[k]
+        a, b = wave[j], wave[0]
+        for k in range(soft.size):
+            row[k] = (a - soft[k] * row[k]) / (1.0 + soft[k] * b)
+
+
+def _soft_series(vectors, rows, source, term, waves, total):
+    """As `_series`, with a wave for every system."""
+    for k in range(total.size):
+        total[k] = 0.0
+    for j in range(term + 1):
+        wave, p = waves[j], vectors[source + (term - j) * rows]
+        for k in range(total.size):
+            total[k] += wave[k] * p[k]
 
 
 def _scale(total, sign, sizes, added, target):

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 _SET, _ADD, _SERIES = 0, 1, 2  # a linear combination, set or added; with _SERIES a product of series
 _CACHED = 1 << 15  # numbers that a chunk of systems works on
 _ALIKE = 16  # the size of a chunk is a multiple of this, so that loops over all columns leave no rest for SIMD code
-_MOST = 1 << 22  # numbers of inverse masses that are given at a time
+_MOST = 1 << 22  # numbers of coefficients or inverse masses that are given at a time
 
 
 class Loop(Protocol):
@@ -43,6 +43,8 @@ class Loop(Protocol):
         waves: Array,
         counts: NDArray[np.int64],
         sizes: Array,
+        soft_rows: NDArray[np.int64],
+        soft: Array,
         h: Array,
         rate: Array,
         limit: float,
@@ -71,6 +73,8 @@ class Loop(Protocol):
         waves : ndarray, shape (steps, R, order)
             Coefficients of the oscillations, of which the first ``counts`` are used.
         sizes : ndarray, shape (R, points)
+        soft_rows, soft : ndarray, shapes (R,), (rows, points)
+            Row of the compliance of an oscillation, or -1; the compliances times the sizes.
         h, rate : ndarray, shape (points,)
             Step, and the rate by which displacements are compared with momenta.
         limit : float
@@ -156,33 +160,53 @@ class Program:
     ) -> Array:
         """Return the maps of some of the systems over a period, or over half of it, shape (points, 2N, 2N)."""
         system, number = self.system.take(index), steps // 2 if half else steps
-        rows = [
-            [step_coefficients(s.oscillation, step, steps, order - 1, SHARE * tolerance) for s in system.swings]
-            for step in range(number)
-        ]
-        counts = np.array([len(wave) for wave in rows[0]], dtype=np.int64)
-        waves = np.zeros((number, len(counts), order))
-        for step, row in enumerate(rows):
-            for swing, wave in enumerate(row):
-                waves[step, swing, : len(wave)] = wave
-        operations, sources = np.array(self.operations, dtype=np.int64).T, [source for source, _ in self.entries]
+        most = max(1, _MOST // max(1, order * len(system.swings), int(self.inverse.sum()) * index.size))
+        total: Array | None = None
+        for start in range(0, number, most):
+            some = range(start, min(start + most, number))
+            found = self._propagated(system, index, rate, some, steps, order, tolerance, loop)
+            total = found if total is None else found @ total
+        assert total is not None
+        return total
+
+    def _propagated(
+        self,
+        system: PeriodicSystem,
+        index: NDArray[np.intp],
+        rate: Array,
+        some: range,
+        steps: int,
+        order: int,
+        tolerance: float,
+        loop: Loop,
+    ) -> Array:
+        """Return the maps over some of the steps of a period."""
+        waves = np.zeros((len(some), len(system.swings), order))
+        inverse = np.empty((len(some), int(self.inverse.sum()), index.size))
+        counts = np.zeros(len(system.swings), dtype=np.int64)
+        for row, step in enumerate(some):
+            found = [step_coefficients(s.oscillation, step, steps, order - 1, SHARE * tolerance) for s in system.swings]
+            for swing, wave in enumerate(found):
+                counts[swing] = len(wave)
+                waves[row, swing, : len(wave)] = wave
+            masses = mass_and_inverse(system, found)
+            if masses is not None:
+                inverse[row] = masses[1][self.inverse]
         factors = [factor if factor.size == 1 else factor[index] for _, factor in self.entries]
         points = max(factor.size for factor in factors)
-        inverse = np.empty((number, int(self.inverse.sum()), index.size))
-        if self.inverse.any():
-            for step, row in enumerate(rows):
-                found = mass_and_inverse(system, row)
-                assert found is not None
-                inverse[step] = found[1][self.inverse]
         shared = np.array([factor.size == 1 for factor in factors], dtype=np.int64)
         shared[self.first_inverse : self.first_inverse + inverse.shape[1]] = 0
-        out = np.empty((index.size, 2 * self.size, 2 * self.size))
+        flexible = np.array([s.compliance is not None for s in system.swings], dtype=bool)
+        soft = [s.size * s.compliance for s in system.swings if s.compliance is not None]
+        kinds, targets, swings = np.array(self.operations, dtype=np.int64).reshape(-1, 3).T.copy()
         numbers = 2 * self.size * (self.kept + order * self.rows)
+        out = np.empty((index.size, 2 * self.size, 2 * self.size))
         loop(
-            *map(np.ascontiguousarray, operations[:2]),
-            np.array(self.starts),
-            np.array(sources),
-            np.ascontiguousarray(operations[2]),
+            kinds,
+            targets,
+            np.array(self.starts, dtype=np.int64),
+            np.array([source for source, _ in self.entries], dtype=np.int64),
+            swings,
             shared,
             np.array([np.broadcast_to(factor, points) for factor in factors]),
             self.first_inverse,
@@ -192,7 +216,9 @@ class Program:
             self.moved,
             waves,
             counts,
-            np.array([swing.size for swing in system.swings]),
+            np.array([s.size for s in system.swings]).reshape(-1, index.size),
+            np.where(flexible, np.cumsum(flexible) - 1, -1),
+            np.array(soft).reshape(-1, index.size),
             system.period / steps,
             rate,
             tolerance / steps,

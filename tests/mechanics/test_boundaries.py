@@ -7,7 +7,8 @@ import pytest
 
 from cra_sym.kernels import derived_kernel
 from cra_sym.mechanics.boundaries import general_resonance
-from cra_sym.solvers.floquet import floquet_exponents
+from cra_sym.solvers.floquet import Oscillation
+from cra_sym.solvers.periodic import floquet_exponents
 
 LABELS = {"principal": {"n": 1}, "sum": {"m": 0, "n": 2}, "difference": {"m": 2, "n": 0}}
 
@@ -49,7 +50,9 @@ def truth(sides, omega, coupling, epsilon, decay, power):
     for _ in range(6):
         grid = np.linspace(inside, outside, 17, axis=-1)
         matrices = coupling * grid[..., None, None, None] ** power
-        exponents = floquet_exponents(omega, matrices, grid, epsilon, decay, tolerance=1e-10)
+        stiffness, damping = np.diag(omega**2), np.diag(2.0 * np.broadcast_to(decay, omega.shape))
+        waves = [(Oscillation(1, "cos", 0), (part, None, None, None)) for part in np.moveaxis(matrices, -3, 0)]
+        exponents = floquet_exponents(stiffness, damping, waves, grid, epsilon, tolerance=1e-10)
         growing = exponents[..., 0].real > (0.0 if np.any(decay) else 1e-5 * half)
         assert growing[:, 0].all() and not growing[:, -1].any()
         still = np.argmin(growing, axis=-1)[:, None]

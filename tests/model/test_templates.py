@@ -183,17 +183,7 @@ def test_a_mode_that_needs_another_basis_than_those_beside_it(loose, beams):
     np.testing.assert_allclose(one, two, rtol=1e-12, atol=1e-10)
 
 
-def test_floquet():
-    coupling = np.array([[[1.0, 0.4], [0.3, -0.7]], [[0.2, 0.1], [0.1, 0.5]], [[0.0, 0.3], [-0.2, 0.1]]])
-    system = (np.array([1.0, 2.2]), coupling, np.array([1.9, 3.1, 4.2, 5.0]), 0.3, np.array([0.01, 0.03]))
-    one, two = (
-        floquet.monodromy(*system, compliance=np.array([0.5, 0.2, 0.3]), tolerance=1e-4, loop=loop)
-        for loop in (plain("solvers/floquet_lanes", *growth._splitting_parts()).propagate, None)
-    )
-    np.testing.assert_allclose(one, two, rtol=1e-11, atol=1e-13)
-
-
-@pytest.mark.parametrize("kind", ["stiffness", "damper", "mass", "masses", "several", "none"])
+@pytest.mark.parametrize("kind", ["stiffness", "soft", "damper", "mass", "masses", "several", "none", "nothing"])
 def test_series_of_periodic_systems(kind):
     """Three steps of few systems; what is common to all of them or not, and of low rank or not."""
     rng = np.random.default_rng(8)
@@ -202,14 +192,17 @@ def test_series_of_periodic_systems(kind):
     some, others = (0.1 * rng.normal(size=(4, 2, 2)) for _ in range(2))
     drives = {
         "stiffness": [(wave, (some[0], None, None, None))],
+        "soft": [(wave, (part, None, None, None)) for part in others[:2]],
         "damper": [(wave, (None, np.ones((2, 2)), None, None))],
         "mass": [(wave, (None, None, None, 0.2 * np.eye(2)))],
         "masses": [(wave, some), (floquet.Oscillation(2, "sin", 1), others)],
         "several": [(wave, [0.1 * rng.normal(size=(points, 2, 2)), None, some[1], some[2]])],
         "none": [(wave, (np.zeros((2, 2)), None, None, None))],
+        "nothing": [],
     }[kind]
-    system, _ = periodic.PeriodicSystem.of(still, drag, drives, np.linspace(2.0, 3.0, points), 0.3)
-    loop = plain("solvers/taylor_lanes", *growth._series_parts()).propagate
+    soft = [0.9, 0.2] if kind == "soft" else None
+    system, _ = periodic.PeriodicSystem.of(still, drag, drives, np.linspace(2.0, 3.0, points), 0.3, soft)
+    loop = plain("solvers/taylor_lanes", *growth._template_parts()).propagate
     one, two = (periodic.monodromy(system, 1e-3, found) for found in (loop, None))
     # the same series, but steps may end one coefficient earlier or later, which is within the tolerance
     np.testing.assert_allclose(one, two, rtol=0.0, atol=1e-3 * np.abs(two).max())

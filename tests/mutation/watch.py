@@ -224,7 +224,6 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "solvers/proved_stability": [[_PERIODIC]],
     "analysis/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/analysis/test_responses.py"]],
-    "solvers/floquet_lanes": [[f"{_LANES[0]}::test_floquet"]],
     "solvers/certificates": [["tests/analysis/test_certification.py"]],
     "solvers/ball_stiffness": [["tests/analysis/test_certification.py"]],
     "solvers/ball_determinant": [["tests/analysis/test_certified_eigenvalues.py"]],

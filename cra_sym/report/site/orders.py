@@ -14,8 +14,10 @@ from scipy.special import ellipk
 
 import cra_sym as cra
 from cra_sym.analysis.floquet_boundary import floquet_boundary
-from cra_sym.solvers import floquet
+from cra_sym.solvers.floquet import Oscillation
+from cra_sym.solvers.periodic import PeriodicSystem, monodromy
 from cra_sym.solvers.stiffness import DynamicStiffness, exponential
+from cra_sym.solvers.taylor import propagated
 from cra_sym.symbols import L, t, v, x
 
 __all__ = ["Order", "orders"]
@@ -129,14 +131,13 @@ def _records() -> float:
 
 
 def _floquet_steps() -> float:
-    """Three coupled and damped modes."""
+    """Three coupled and damped modes, of whose series eight terms are taken."""
     omega, coupling = np.array([1.0, 2.3, 4.1]), np.array([[0.7, 0.4, -0.2], [0.4, -0.9, 0.5], [-0.2, 0.5, 1.1]])
-    given = omega, coupling[None], 2.7, 0.3, 0.02 * omega
-    exact = floquet.monodromy(*given, tolerance=1e-13)
-    tolerances = 1e-7, 1e-9
-    steps = [float(floquet.ExcitedOscillators.of(*given)[0].steps(tolerance)[0]) for tolerance in tolerances]
-    errors = [np.abs(floquet.monodromy(*given, tolerance=tolerance) - exact).max() for tolerance in tolerances]
-    return _power(steps[::-1], errors)
+    drives = [(Oscillation(1, "cos", 0), (coupling, None, None, None))]
+    system, _ = PeriodicSystem.of(np.diag(omega**2), np.diag(0.04 * omega), drives, 2.7, 0.3)
+    exact, numbers = monodromy(system, 1e-13)[0], (24, 48)
+    errors = [np.abs(list(propagated(system, steps, 8))[-1][..., 0] - exact).max() for steps in numbers]
+    return _power(numbers[::-1], errors)
 
 
 @cache
@@ -245,7 +246,11 @@ _ROWS: tuple[_Row, ...] = (
     (("Ritz, string: eigenvalues", "element", "the characteristic function"), 6.0, _ritz_of_a_string),
     (("dynamic stiffness: Magnus steps along x", "step", "solutions in closed form"), 6.0, _magnus),
     (("sampled motions: acceleration between samples", "sampling interval", "the function"), 2.0, _records),
-    (("Floquet: steps of the monodromy matrix", "step", "the same with a tolerance of 1e-13"), 4.0, _floquet_steps),
+    (
+        ("Floquet: Taylor steps of order 8 of the monodromy matrix", "step", "the same with a tolerance of 1e-13"),
+        8.0,
+        _floquet_steps,
+    ),
     (("Gauss rules over slip displacements: loss of an Iwan element", "1/elements", "closed form"), 2.0, _iwan),
     (("multiple scales, order 1: boundary", "epsilon", "bisection on Floquet exponents"), 2.0, lambda: _boundary(1)),
     (("multiple scales, order 2: boundary", "epsilon", "bisection on Floquet exponents"), 3.0, lambda: _boundary(2)),
