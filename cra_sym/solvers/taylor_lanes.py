@@ -133,20 +133,26 @@ def _norms(vectors, size, rate, out):
 def _combine(values, shared, sources, start, stop, added, vectors, kept, shift, target):
     """Set the target to a linear combination of vectors, or add it."""
     e = start
-    if added == 0:
-        if start == stop:
+    if added == 0 and start == stop:
+        for k in range(target.size):
+            target[k] = 0.0
+    elif added == 0:
+        vector = vectors[sources[e] + (shift if sources[e] >= kept else 0)]
+        if shared[e] == 0:
+            factors = values[e]
             for k in range(target.size):
-                target[k] = 0.0
+                target[k] = factors[k] * vector[k]
+            e += 1
+        elif e + 1 < stop and shared[e + 1] > 0:
+            other = vectors[sources[e + 1] + (shift if sources[e + 1] >= kept else 0)]
+            a, b = values[e, 0], values[e + 1, 0]
+            for k in range(target.size):
+                target[k] = a * vector[k] + b * other[k]
+            e += 2
         else:
-            vector = vectors[sources[e] + (shift if sources[e] >= kept else 0)]
-            if shared[e] > 0:
-                factor = values[e, 0]
-                for k in range(target.size):
-                    target[k] = factor * vector[k]
-            else:
-                factors = values[e]
-                for k in range(target.size):
-                    target[k] = factors[k] * vector[k]
+            factor = values[e, 0]
+            for k in range(target.size):
+                target[k] = factor * vector[k]
             e += 1
     while e < stop:
         vector = vectors[sources[e] + (shift if sources[e] >= kept else 0)]

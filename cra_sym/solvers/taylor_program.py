@@ -19,7 +19,7 @@ __all__ = ["Loop", "Program"]
 Array = NDArray[np.float64]
 _SET, _ADD, _SERIES = 0, 1, 2  # a linear combination, set or added; with _SERIES a product of series
 _CACHED = 1 << 15  # numbers that a chunk of systems works on
-_ALIKE = 16  # the size of a chunk is a multiple of this, so that loops over all columns leave no rest for SIMD code
+_FEWEST = 16  # systems in a chunk, or a multiple of it: loops over all columns then leave no rest for SIMD code
 _MOST = 1 << 22  # numbers of coefficients or inverse masses that are given at a time
 
 
@@ -224,7 +224,7 @@ class Program:
             tolerance / steps,
             LEAST_ORDER,
             order,
-            min(index.size, max(1, _CACHED // numbers // _ALIKE * _ALIKE)),
+            min(index.size, max(_FEWEST, _CACHED // numbers // _FEWEST * _FEWEST)),
             out,
         )
         return out

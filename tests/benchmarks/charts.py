@@ -57,6 +57,7 @@ def systems() -> dict[str, tuple[cra.System, cra.Fluctuation]]:
     beam = {EI: 1.0, rhoA: 1.0, L: 1.0, m: 0.2, k: 1e3}
     return {
         "the arm": (cra.Arm.nominal().replace(k_t=1e3), cra.JointStiffness()),
+        "the arm, its mass": (cra.Arm.nominal().replace(k_t=1e3), cra.Fluctuation(rho=1.0)),
         "Timoshenko arm": (TIMOSHENKO.at({**beam, rhoI: 1e-3, kGA: 300.0}), cra.Fluctuation(k=1.0)),
         "arm with a damper": (DAMPED.at({**beam, d: 0.05}), cra.Fluctuation(k=1.0)),
         "moving belt": (BELT.at({rhoA: 1.0, c: 0.3, T: 1.0, L: 1.0}), cra.Fluctuation(T=1.0)),
@@ -72,7 +73,7 @@ def chart(system: cra.System) -> tuple[np.ndarray, np.ndarray]:
 
 
 def costs(rounds: int = 3) -> dict[str, float]:
-    """Return what a chart costs beside the arm's, compiled."""
+    """Return what a chart costs beside the arm's, whose stiffness or mass oscillates too, compiled."""
     found: dict[str, float] = {}
     for name, (system, excitation) in systems().items():
         at, times = chart(system), []
@@ -82,7 +83,8 @@ def costs(rounds: int = 3) -> dict[str, float]:
             cra.growth_rate(system, excitation, *at, MODES, backend="compiled")
             times.append(process_time() - start)
         found[name] = min(times)
-    return {name: round(seconds / found["the arm"], 2) for name, seconds in found.items()}
+    arms = {name: found["the arm, its mass" if name.endswith("its mass") else "the arm"] for name in found}
+    return {name: round(seconds / arms[name], 2) for name, seconds in found.items()}
 
 
 def proofs() -> dict[str, dict[str, float]]:
