@@ -17,7 +17,7 @@ from cra_sym.model.modal_matrices import ModalMatrices, modal_matrices
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.si import Numbers, paired
 from cra_sym.solvers import periodic
-from cra_sym.solvers.taylor_program import Loop
+from cra_sym.solvers.taylor_operations import Loop
 
 __all__ = [
     "Matrices",
@@ -41,7 +41,7 @@ def growth_rate(
     modes: int = 3,
     *,
     residual: bool = False,
-    tolerance: float = 1e-8,
+    tolerance: float = 1e-10,
     backend: str = "auto",
 ) -> np.ndarray:
     """Return the growth rate of vibration: max(0, largest real part of the Floquet exponents).
@@ -100,7 +100,7 @@ def floquet_exponents(
     modes: int = 3,
     *,
     residual: bool = False,
-    tolerance: float = 1e-8,
+    tolerance: float = 1e-10,
     backend: str = "auto",
 ) -> np.ndarray:
     """Return all Floquet exponents of the excited system, largest real part first.

@@ -27,7 +27,7 @@ from cra_sym.solvers.floquet import (
 )
 from cra_sym.solvers.periodic_systems import LIGHTEST, PeriodicSystem, Sizes, Swing
 from cra_sym.solvers.taylor import LEAST_ORDER, propagated
-from cra_sym.solvers.taylor_program import Loop, Program
+from cra_sym.solvers.taylor_operations import Loop, Operations
 
 __all__ = [
     "PeriodicSystem",
@@ -86,12 +86,12 @@ def _maps(system: PeriodicSystem, tolerance: float, loop: Loop | None) -> _Maps:
     measures = np.array([np.log(angle), _SWUNG * np.log(swung)])
     blocks = _alike(np.arange(points), measures, max(1, 2 * _STATES // size**2)) if points else []
     series = _majorants(system, rate, blocks).T if points else ()
-    program = Program(system) if loop is not None and points else None
+    operations = Operations(system) if loop is not None and points else None
     half = parity is not None
     for block, logs in zip(blocks, series, strict=True):
         steps, order = _cheapest(logs, tolerance)
-        if program is not None and loop is not None:
-            out[block] = program.maps(block, rate[block], steps, order, tolerance, half=half, loop=loop)
+        if operations is not None and loop is not None:
+            out[block] = operations.maps(block, rate[block], steps, order, tolerance, half=half, loop=loop)
             continue
         states = propagated(system.take(block), steps, order, half=half, tolerance=tolerance, factored=True)
         out[block] = np.moveaxis(deque(states, maxlen=1)[0], -1, 0)
@@ -108,7 +108,7 @@ def _alike(index: NDArray[np.intp], measures: Array, most: int) -> list[NDArray[
     return _alike(index[:half], measures, most) + _alike(index[half:], measures, most)
 
 
-def monodromy(system: PeriodicSystem, tolerance: float = 1e-8, loop: Loop | None = None) -> Array:
+def monodromy(system: PeriodicSystem, tolerance: float = 1e-10, loop: Loop | None = None) -> Array:
     """Return the monodromy matrices of (q, p), shape (points, 2N, 2N), for a relative error of about ``tolerance``."""
     found = _maps(system, tolerance, loop)
     if found.axes is None:
@@ -203,7 +203,7 @@ def _pairs(system: PeriodicSystem, tolerance: float, loop: Loop | None) -> tuple
     return paired_exponents(found.canonical(), system.period), found.maps
 
 
-def growth_rate(*given: Any, tolerance: float = 1e-8, loop: Loop | None = None) -> Array:
+def growth_rate(*given: Any, tolerance: float = 1e-10, loop: Loop | None = None) -> Array:
     """Return max(0, largest real part of the exponents), shape (...); arguments of :meth:`PeriodicSystem.of`."""
     system, shape = PeriodicSystem.of(*given)
     growing, maps = _pairs(system, tolerance, loop)
@@ -213,7 +213,7 @@ def growth_rate(*given: Any, tolerance: float = 1e-8, loop: Loop | None = None) 
     return rates.reshape(shape)
 
 
-def floquet_exponents(*given: Any, tolerance: float = 1e-8, loop: Loop | None = None) -> NDArray[np.complex128]:
+def floquet_exponents(*given: Any, tolerance: float = 1e-10, loop: Loop | None = None) -> NDArray[np.complex128]:
     """Return all Floquet exponents, shape (..., 2N), largest real part first; arguments as :func:`growth_rate`."""
     system, shape = PeriodicSystem.of(*given)
     growing, maps = _pairs(system, tolerance, loop)

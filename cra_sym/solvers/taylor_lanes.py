@@ -34,7 +34,7 @@ def propagate(
     chunk,
     out,
 ):
-    """Write the maps over all steps to ``out``; arguments as `cra_sym.solvers.taylor_program.Loop` has them."""
+    """Write the maps over all steps to ``out``; arguments as `cra_sym.solvers.taylor_operations.Loop` has them."""
     columns, width = out.shape[1], out.shape[1] * chunk
     size, force = columns // 2, columns
     own, own_h, own_rate = np.empty((len(values), width)), np.empty(width), np.empty(width)

@@ -141,7 +141,6 @@ _FLOQUET = [
     [
         f"tests/solvers/test_floquet.py::test_{name}"
         for name in (
-            "free_modes_drift_by_the_exponential_of_their_matrix",
             "mathieu_edges",
             "monodromy_is_that_of_a_general_integrator",
             "compliance_is_a_spring_in_series",
@@ -150,7 +149,6 @@ _FLOQUET = [
             "no_excitation_no_growth",
             "growth_is_that_of_the_fastest_exponent",
             "any_argument_alone_may_be_the_batch",
-            "a_coupling_in_parts_takes_the_same_steps",
             "batch_equals_loop",
         )
     ],
@@ -220,7 +218,7 @@ _ROUNDS: dict[str, list[list[str]]] = {
     "solvers/periodic": [[_PERIODIC]],
     "solvers/taylor": [[_PERIODIC]],
     "solvers/taylor_lanes": [[f"{_LANES[0]}::test_series_of_periodic_systems"]],
-    "solvers/taylor_program": [[f"{_LANES[0]}::test_series_of_periodic_systems"]],
+    "solvers/taylor_operations": [[f"{_LANES[0]}::test_series_of_periodic_systems"]],
     "solvers/proved_stability": [[_PERIODIC]],
     "analysis/zones": [[*_ZONES, *_SUMMED], [*_LOOPED, *_DAMPED, *_DOUBTS], _ORDER],
     "model/oscillator": [["tests/model/test_oscillator.py"], ["tests/analysis/test_responses.py"]],

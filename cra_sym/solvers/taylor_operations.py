@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from cra_sym.solvers.periodic_systems import PeriodicSystem
 from cra_sym.solvers.taylor import LEAST_ORDER, SHARE, factors, mass_and_inverse, step_coefficients
 
-__all__ = ["Loop", "Program"]
+__all__ = ["Loop", "Operations"]
 
 Array = NDArray[np.float64]
 _SET, _ADD, _SERIES = 0, 1, 2  # a linear combination, set or added; with _SERIES a product of series
@@ -86,7 +86,7 @@ class Loop(Protocol):
         """
 
 
-class Program:
+class Operations:
     """The operations of a batch of systems."""
 
     def __init__(self, system: PeriodicSystem) -> None:
