@@ -152,7 +152,6 @@ _FLOQUET = [
             "batch_equals_loop",
         )
     ],
-    [f"{_LANES[0]}::test_floquet"],
 ]
 _COUPLED = ["tests/solvers/test_coupled_modes.py"]
 _PHYSICS = [_FREQUENCIES, _MODES]
