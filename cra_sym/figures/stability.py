@@ -297,18 +297,21 @@ def figure_combinations(
     epsilon = one_number("epsilon", epsilon, low=0.0, open_low=True, unit="1")
     ax = panel(ax, (9.4, 5.0))
     still = rigid_body_modes(system)
-    omega = oscillating_frequencies(system, still + 3)
+    last, shown = (min(still + more, system.most_modes) for more in (3, 4))
+    if last == still:
+        raise ValueError("system: has rigid-body motions alone; must have a mode that vibrates")
+    omega = oscillating_frequencies(system, last)
     frequency = np.linspace(0.5 * omega[still], 2.2 * omega[-1], points)
     sizes = np.linspace(0.0, epsilon, points // 3)
-    rates = np.sqrt(_growth(system, excitation, frequency, sizes, still + 4))
+    rates = np.sqrt(_growth(system, excitation, frequency, sizes, shown))
     mesh = _shade(ax, frequency, sizes, rates, step=1.0 if rates.max() > 3 else None)
-    for m in range(still + 1, still + 4):
-        for n in range(m, still + 4):
-            for side in quiet_boundary(system, excitation, sizes, (m, n), order=2, modes=still + 3):
+    for m in range(still + 1, last + 1):
+        for n in range(m, last + 1):
+            for side in quiet_boundary(system, excitation, sizes, (m, n), order=2, modes=last):
                 ax.plot(side, sizes, **SECOND | {"linewidth": 0.9})
             name = f"$2\\omega_{m}$" if m == n else f"$\\omega_{m}+\\omega_{n}$"
             _name(ax, name, omega[m - 1] + omega[n - 1], epsilon)
-        for side in quiet_boundary(system, excitation, sizes, (m, m), order=2, tongue=2, modes=still + 3):
+        for side in quiet_boundary(system, excitation, sizes, (m, m), order=2, tongue=2, modes=last):
             ax.plot(side, sizes, **FIRST | {"linewidth": 0.9})
         _name(ax, f"$\\omega_{m}$", omega[m - 1], epsilon, above=16, color=FIRST["color"])
     ax.set_xlim(frequency[0], frequency[-1])
@@ -320,7 +323,7 @@ def figure_combinations(
     handles = [ax.plot([], [], **look)[0] for look in (SECOND, FIRST)]
     figure = figure_of(ax)
     names = ("multiple scales, second order", "second tongue, width of order ε²")
-    note = f"shaded: growth by Floquet theory, {still + 4} modes; thin streaks are tongues of higher order"
+    note = f"shaded: growth by Floquet theory, {shown} modes; thin streaks are tongues of higher order"
     figure.legend(handles, names, loc="outside lower center", ncols=2, title=note, title_fontsize=8)
     if mesh is None:
         say(ax, "no growth up to this ε")

@@ -28,6 +28,7 @@ from cra_sym.figures.subject import (
     parameter_label,
     parameter_name,
     single,
+    unknowns,
 )
 from cra_sym.model.system import System
 from cra_sym.solvers.force import Force
@@ -42,6 +43,7 @@ __all__ = ["figure_frequency_response", "figure_input_shaping", "figure_residual
 _SIZE = (8.6, 3.9)
 _LOOSE = {"k_t": 1e3, "k_r": 1e2}
 _LIMITS = {"distance": 0.5, "v_max": 1.0, "a_max": 4.0, "j_max": 40.0}  # m, m/s, m/s2, m/s3
+_AT_REST = "system: its right end does not move; 'response' shows the place that moves most"
 _MOVE = "0.5 m S-curve, at most 1 m/s, 4 m/s², 40 m/s³"
 
 
@@ -57,7 +59,7 @@ def figure_frequency_response(
     """Draw the exact frequency response of both ends, and what keeping a few modes makes of it.
 
     Where no mode moves the right end, the place that the first mode moves most takes its place, and is alone if
-    nothing moves the left end either.
+    nothing moves the left end either. Of lumped coordinates alone it is that of the first one.
 
     Parameters
     ----------
@@ -73,24 +75,26 @@ def figure_frequency_response(
     """
     given = Arm.nominal().replace(k_t=1e5, k_r=1e3, zeta=0.01) if system is None else system
     system = single(given)
-    if not fields(system):
-        raise ValueError("system: has coordinates alone; must have a field along which places are shown")
-    tip, left = moving_place(system), float(system.domain.left)
-    shapes = np.abs(mode_shapes(system.basis, [left, tip], 3))
-    places = [tip, left] if shapes[:, 0].max() > 1e-9 * shapes[:, 1].max() else [tip]
-    drive = _drive(system, tip) if drive is None else drive
+    places = _places_shown(system)
+    drive = _drive(system, places[0]) if drive is None else drive
     count("points", points, low=2)
     (row,) = panels(axes, 1, len(places), (4.3 * len(places), 3.9), sharex=True)
-    elastic = [value for value in oscillating_frequencies(system, 6) if value > 0]
-    Omega = np.geomspace(float(f"{0.13 * elastic[0]:.0e}"), float(f"{2.25 * elastic[2]:.0e}"), points)
-    exact = np.abs(frequency_response(system, Omega, places, drive))
+    most = system.most_modes
+    elastic = [value for value in oscillating_frequencies(system, min(6, most)) if value > 0][:3]
+    if not elastic:
+        raise ValueError("system: has rigid-body motions alone; must have a mode that vibrates")
+    Omega = np.geomspace(float(f"{0.13 * elastic[0]:.0e}"), float(f"{2.25 * elastic[-1]:.0e}"), points)
+    there, field = (np.array(places), None) if fields(system) else (None, system.model.equations.coordinates[0])
+    exact = np.abs(frequency_response(system, Omega, there, drive, field=field)).reshape(len(places), -1)
     titles = ("Tip: few modes are enough", "Joint: modes converge slowly")
     for number, (ax, place) in enumerate(zip(row, places, strict=True)):
         ax.loglog(Omega, exact[number], label="exact", color="0.25", linestyle="-")
-        for modes in (3, 12):
-            ax.loglog(Omega, np.abs(_of_modes(system, Omega, place, drive, modes)), label=f"{modes} modes",
-                      linewidth=1.3, linestyle=("--", ":")[modes > 3], color=(ORANGE, GREEN)[modes > 3])  # fmt: skip
-        ax.set_title(titles[number] if isinstance(system, Arm) else f"at $x$ = {place:g} m")
+        for modes in (3, 12) if most > 3 else range(1, min(most, 2)):
+            ax.loglog(Omega, np.abs(_of_modes(system, Omega, place, drive, modes)),
+                      label=f"{modes} mode{'s' * (modes > 1)}", linewidth=1.3, linestyle=("--", ":")[modes > 3],
+                      color=(ORANGE, GREEN)[modes > 3])  # fmt: skip
+        at = f"${unknowns(system)[0]}$" if place is None else f"at $x$ = {place:g} m"
+        ax.set_title(titles[number] if isinstance(system, Arm) else at)
         driven = "of the base " if isinstance(system, Arm) and drive == "w" else ""
         ax.set_xlabel(rf"frequency {driven}$\Omega$ / (rad/s)")
     row[0].set_ylabel(_response_label(system, drive))
@@ -98,21 +102,35 @@ def figure_frequency_response(
     return _caption(row, _values(system))
 
 
-def _drive(system: System, place: float) -> Expr | str:
-    """Return the default input: the first prescribed motion or force by name, or the field at a place."""
+def _places_shown(system: System) -> list[float] | list[None]:
+    """Return the places of a frequency response; of coordinates alone None, which have no place."""
+    if not fields(system):
+        return [None]
+    tip, left = moving_place(system), float(system.domain.left)
+    shapes = np.abs(mode_shapes(system.basis, [left, tip], 3))
+    return [tip, left] if shapes[:, 0].max() > 1e-9 * shapes[:, 1].max() else [tip]
+
+
+def _drive(system: System, place: float | None) -> Expr | str:
+    """Return the default input: the first prescribed motion or force by name, or what is shown at a place."""
     causes = dict(system.numerics("causes"))
     ordered = sorted(causes, key=lambda name: causes[name] != "motion")
     if ordered:
         return ordered[0]
+    if place is None:
+        return system.model.equations.coordinates[0]
     field, (_, right) = system.model.equations.fields[0], system.model.equations.domain
     x = system.model.equations.x
     return field.subs(x, right if np.isclose(place, float(system.domain.left + system.domain.length)) else place)
 
 
-def _of_modes(system: System, Omega: np.ndarray, place: float, drive: Expr | str, modes: int) -> np.ndarray:
+def _of_modes(system: System, Omega: np.ndarray, place: float | None, drive: Expr | str, modes: int) -> np.ndarray:
     """Return the transfer function of the first modes alone."""
-    field = "v" if isinstance(system, Arm) else system.model.equations.fields[0].func.__name__
-    few = state_space(system, modes, drive, [(field, place)])
+    if place is None:
+        few = state_space(system, modes, drive, [system.model.equations.coordinates[0].func.__name__])
+    else:
+        field = "v" if isinstance(system, Arm) else system.model.equations.fields[0].func.__name__
+        few = state_space(system, modes, drive, [(field, place)])
     size, points = len(few.A), 1j * Omega[:, None, None]
     found: np.ndarray = few.C @ np.linalg.solve(points * np.eye(size) - few.A, few.B) + few.D
     by_displacement = dict(system.numerics("causes")).get(str(drive)) == "support"
@@ -124,7 +142,7 @@ def _response_label(system: System, drive: Expr | str) -> str:
         return "elastic displacement per base acceleration / s²"
     kind = dict(system.numerics("causes")).get(str(drive))
     per = {"motion": "acceleration", "support": "displacement"}.get(str(kind), "force")
-    return f"${next(iter(fields(system)))}$ per unit {per} / SI unit"
+    return f"${unknowns(system)[0]}$ per unit {per} / SI unit"
 
 
 def _values(system: System) -> str:
@@ -157,9 +175,9 @@ def figure_residual_vibration(
     fastest = BaseMotion.s_curve(**_LIMITS).duration
     duration = np.linspace(fastest, fastest + 4.25 / _first(stiffest), 7 * points // 4)
     move = _alone(system, BaseMotion.s_curve(**_LIMITS, duration=duration))
-    left = np.asarray(residual_vibration(system.replace(**{name: values[:, None]}), move))
+    left = np.asarray(residual_vibration(system.replace(**{name: values[:, None]}), move, _modes(system)))
     if not np.nanmax(left) > 0:
-        raise ValueError("system: its right end does not move; 'response' shows the place that moves most")
+        raise ValueError(_AT_REST)
     top = 10.0 ** np.ceil(np.log10(1e3 * left[np.isfinite(left)].max()))
     norm = LogNorm(1e-4 * top, top)
     mesh = ax.pcolormesh(duration, values, 1e3 * left, norm=norm, shading="gouraud", rasterized=True)
@@ -209,13 +227,15 @@ def figure_input_shaping(
     left, right = row
     moves, period = shaped_moves(system), 1 / _first(system)
     end = float(f"{moves['ZVD'].duration + 2.65 * period:.2g}")
-    stiff = name in system.numerics("stiffnesses")
-    wrong = np.geomspace(0.1, 10.0, points) if stiff else np.geomspace(0.5, 2.0, points)
-    t, others = np.linspace(0, end, 8 * points - 7), system.replace(**{name: wrong * value})
+    t, wrong = np.linspace(0, end, 8 * points - 7), _wrongly_known(system, name, points)
+    others = system.replace(**{name: wrong * value})
     for kind, move in moves.items():
         given, label = _alone(system, move), f"{kind}, {move.duration:.2f} s"
-        left.plot(t, 1e3 * tip_response(system, given, t), label=label, linewidth=1.4)
-        right.loglog(wrong, 1e3 * residual_vibration(others, given), linewidth=1.4)
+        rest = np.asarray(residual_vibration(others, given, _modes(system)))
+        if not np.nanmax(rest) > 0:
+            raise ValueError(_AT_REST)
+        left.plot(t, 1e3 * tip_response(system, given, t, _modes(system)), label=label, linewidth=1.4)
+        right.loglog(wrong, 1e3 * rest, linewidth=1.4)
     left.legend(loc="lower left", bbox_to_anchor=(0.0, 0.98), ncols=2, borderaxespad=0, fontsize=8)
     left.set_title("Input shaping from the computed modes", pad=36)
     left.set_xlabel("time $t$ / s")
@@ -228,6 +248,24 @@ def figure_input_shaping(
     right.set_ylabel("residual tip amplitude / mm")
     assumed = _values(system) if arm else f"{symbol} = {value:g}, {_values(system)}"
     return _caption(row, f"{_MOVE}; assumed {assumed}")
+
+
+def _wrongly_known(system: System, name: str, points: int) -> np.ndarray:
+    """Return factors of a parameter, up to 10 of a stiffness of an end, else 2, or closer to 1 where that is no system.
+
+    Such as a length beyond which an interior place would be.
+    """
+    value, far = float(system.values[name]), 10.0 if name in system.numerics("stiffnesses") else 2.0
+    for narrowing in range(5):
+        factors = np.geomspace(far ** -(0.5**narrowing), far**0.5**narrowing, points)
+        try:
+            oscillating_frequencies(system.replace(**{name: factors * value}), 1)
+        except ValueError:
+            if narrowing == 4:
+                raise
+        else:
+            return factors
+    raise AssertionError
 
 
 def _subject(system: System, parameter: str | None) -> tuple[System, str]:
@@ -244,9 +282,14 @@ def _alone(system: System, move: BaseMotion) -> dict[str, History]:
     return {name: move if name == cause else none for name, _ in system.numerics("causes")}
 
 
+def _modes(system: System) -> int:
+    """Return the number of modes of a response: five, or all of a system that has fewer."""
+    return min(5, system.most_modes)
+
+
 def _first(system: System) -> np.ndarray:
     """Return the frequency of the first elastic mode, Hz."""
-    found = oscillating_frequencies(system, 3) / (2 * np.pi)
+    found = oscillating_frequencies(system, min(3, system.most_modes)) / (2 * np.pi)
     elastic = np.where(found > 0, found, np.inf).min(axis=-1)
     return np.asarray(elastic)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import sympy as sp
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 import cra_sym as cra
@@ -169,3 +170,47 @@ def test_what_is_left_after_moves_of_any_system_is_the_public_function():
     first = curves(shaped)[0]
     np.testing.assert_allclose(first[:, 1], 1e3 * cra.tip_response(given, {"w": fast, "p": none}, first[:, 0]))
     assert wrong.get_xlabel() == "true $c$ / assumed $c$"
+
+
+def pendulum_under_a_carriage():
+    x, t, m, k, c, g, length = sp.symbols("x t m k c g l")
+    q, turn, w = (sp.Function(name)(t) for name in ("q", "turn", "w"))
+    hung = m * ((q + w).diff(t) + length * turn.diff(t)) ** 2 / 2 - m * g * length * turn**2 / 2
+    return cra.Model(
+        0, fields=[], x=x, domain=(0, 1), t=t, coordinates=[q, turn], prescribed=[w],
+        left=2 * m * (q + w).diff(t) ** 2 / 2 + hung - k * q**2 / 2, virtual_work=[(-c * q.diff(t), q, None)],
+    ).at({"m": 0.6, "k": 100.0, "c": 0.5, "g": 9.81, "l": 0.7})  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["combinations", "frequency_response", "residual_vibration", "input_shaping"])
+def test_figures_of_two_coordinates(name):
+    """They asked for a third mode, or for a field."""
+    given = pendulum_under_a_carriage()
+    drawn = draw(name, given, **COARSE[name])
+    FigureCanvasAgg(drawn).draw()
+    if name == "frequency_response":
+        (panel,) = drawn.axes
+        exact, one = curves(panel)
+        static = np.diag([0.6 * 0.7 * 9.81, 100.0])[::-1, ::-1]
+        mass = 0.6 * np.array([[3.0, 0.7], [0.7, 0.49]])
+        for omega, found in exact[::7]:
+            whole = static + 1j * omega * np.diag([0.5, 0.0]) - omega**2 * mass
+            assert found == pytest.approx(abs(np.linalg.solve(whole, -mass[:, 0])[0]), rel=1e-9)
+        assert one.shape == exact.shape and panel.get_ylabel().startswith("$q$ per unit")
+
+
+def test_a_parameter_is_wrongly_known_as_far_as_there_is_a_system():
+    """A length of half the assumed one would leave the mass outside, which the figure had refused."""
+    x, t, a, m, length = sp.symbols("x t a m l")
+    v, w = sp.Function("v")(x, t), sp.Function("w")(t)
+    beam = cra.Model(
+        (v + w).diff(t) ** 2 / 2 - 5 * v.diff(x, 2) ** 2, fields=[v], x=x, domain=(0, length), t=t, prescribed=[w],
+        essential=[v.subs(x, 0), v.diff(x).subs(x, 0)], inside=[(a, m * (v + w).diff(t) ** 2 / 2)],
+    ).at({"a": 0.9, "m": 0.2, "l": 1.2})  # fmt: skip
+    _, wrong = draw("input_shaping", beam, parameter="l", points=5).axes
+    factors = wrong.lines[0].get_xdata()
+    assert 0.9 / 1.2 < factors[0] < 1.0 and factors[-1] == pytest.approx(1 / factors[0])
+    held = beam.model.replace(essential=[v.subs(x, 0), v.subs(x, length)]).at(beam.values)
+    for name in ("residual_vibration", "input_shaping"):
+        with pytest.raises(ValueError, match="its right end does not move"):
+            draw(name, held, parameter="m", points=3)
