@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,8 @@ from cra_sym.solvers.certificates import UndecidedError, enclose, outward, preci
 from cra_sym.solvers.eigenvalue_enclosures import CharacteristicProblem, Eigenvalue, first_eigenvalues
 
 __all__ = ["Certificate", "EigenvalueCertificate", "certify", "certify_eigenvalues"]
+
+_MORE = 8  # eigenvalues beyond those asked for, the nearest of which bounds the circle
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,13 +190,14 @@ def _proved(
     flint, modes = require("flint", "certify"), guesses.shape[-1]
     held, names = system.numerics("stiffnesses"), system.numerics("names")
     values = np.broadcast_arrays(*system.parameters, np.empty(system.shape))[:-1]
+    near = _neighbours(system, guesses)
     ends, complete = np.full((2, *guesses.shape), complex(np.nan, np.nan)), np.zeros(system.shape, dtype=bool)
     for index in np.ndindex(system.shape):
         given = dict(zip(names, (float(value[index]) for value in values), strict=True))
         problem = bound(flint, system.numerics, held, given, damped)
         try:
             found = _by_count(flint, problem, guesses[index]) or first_eigenvalues(
-                _characteristic(flint, problem), modes, oscillating, float(np.abs(guesses[index]).max())
+                _characteristic(flint, problem), modes, oscillating, float(np.abs(guesses[index]).max()), near[index]
             )
         except UndecidedError:
             continue
@@ -208,6 +212,15 @@ def _proved(
     return ends, complete
 
 
+def _neighbours(system: System, guesses: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """Return guesses of eigenvalues of both kinds, some more than given, if there are as many."""
+    if system.numerics("conservative"):
+        return guesses
+    with suppress(ValueError, ArithmeticError):
+        return np.asarray(eigenvalues(system, guesses.shape[-1] + _MORE, oscillating=False))
+    return guesses
+
+
 def _by_count(flint: Any, problem: BoundProblem, guesses: NDArray[np.complex128]) -> list[Eigenvalue] | None:
     """Return eigenvalues i omega, proved by numbers of frequencies; None if these are not known."""
     gyroscopic = problem.problem.gyroscopic
@@ -215,9 +228,14 @@ def _by_count(flint: Any, problem: BoundProblem, guesses: NDArray[np.complex128]
         return None
     zeros = static_solutions(flint, problem.exact)
     counted = BallStiffness(flint, problem.balls, zeros, gyroscopic)
-    if gyroscopic and (zeros or counted.count(flint.arb(0))):
-        return None
-    found = enclose(flint, counted, guesses.imag / (2 * math.pi))
+    try:
+        if gyroscopic and (zeros or counted.count(flint.arb(0))):
+            return None
+        found = enclose(flint, counted, guesses.imag / (2 * math.pi))
+    except UndecidedError:
+        if gyroscopic:
+            return None
+        raise
     with precision(flint, 128):
         return [Eigenvalue(flint.arb(0), low.union(high) * 2 * flint.arb.pi(), True) for low, high in found]
 
@@ -230,7 +248,8 @@ def _characteristic(flint: Any, problem: BoundProblem) -> CharacteristicProblem:
     while before != at_zero:
         before, at_zero = at_zero, static_solutions(flint, problem.exact.jets(order))
         order += 1
+    determinant = BallDeterminant(flint, problem.balls)
     signature = BallStiffness(flint, problem.balls, rigid).signature if of.dissipative else None
     return CharacteristicProblem(
-        flint, BallDeterminant(flint, problem.balls), of.squared, of.gyroscopic, rigid, at_zero, signature
+        flint, determinant, of.squared, of.gyroscopic or problem.exact.even, rigid, at_zero, signature
     )

@@ -123,6 +123,16 @@ class Spanned:
     boundary: RationalMatrix
     free: Sequence[Sequence[Any]]
 
+    @property
+    def even(self) -> bool:
+        """Whether the parameter occurs in even powers alone, as s does without dampers."""
+        matrices = [
+            self.boundary,
+            *(span.system for span in self.spans),
+            *(m for node in self.nodes for m in node.forces),
+        ]
+        return not any(value != 0 for m in matrices for entry in m.entries for part in entry for value in part[1::2])
+
     def conditions(
         self,
         at: Callable[[RationalMatrix], Rows],

@@ -7,9 +7,13 @@ of the last eigenvalue asked for and of the next.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from .ball_determinant import BallDeterminant
 from .certificates import FIRST_PRECISION, UndecidedError, decided, precision
@@ -17,7 +21,7 @@ from .enclosed_zeros import INSIDE, Disc, Zero
 
 __all__ = ["CharacteristicProblem", "Eigenvalue", "first_eigenvalues"]
 
-_LARGEST_PRECISION = 768
+_LARGEST_PRECISION = 1536
 _WIDER, _MOST_WIDER = 1.5, 12  # factor of the radius where it holds too few eigenvalues, and how often
 _AROUND = 1.3, 1.15, 1.07  # first radius over the largest modulus expected, the largest that is possible
 _SINGULAR = 1.1  # of a larger disc on which the coefficients must be finite
@@ -65,7 +69,7 @@ class CharacteristicProblem:
 
 
 def first_eigenvalues(
-    problem: CharacteristicProblem, modes: int, oscillating: bool, largest: float
+    problem: CharacteristicProblem, modes: int, oscillating: bool, largest: float, guesses: NDArray[np.complex128]
 ) -> list[Eigenvalue]:
     """Return proved enclosures of the first eigenvalues by ascending modulus, one of each conjugate pair.
 
@@ -78,12 +82,15 @@ def first_eigenvalues(
     oscillating : bool
         Leave out real eigenvalues.
     largest : float
-        About the largest modulus among them, rad/s; the proof does not depend on it.
+        About the largest modulus among them, rad/s.
+    guesses : ndarray of complex
+        Of eigenvalues of both kinds, with some that follow, in any order; they make it faster, and the proof depends on
+        neither these nor the largest modulus.
 
     Raises
     ------
     UndecidedError
-        If that is not proved at 768 bits.
+        If that is not proved at 1536 bits.
     ValueError
         If a coefficient may be infinite at such moduli.
     """
@@ -99,7 +106,7 @@ def first_eigenvalues(
         try:
             return decided(
                 problem.flint,
-                partial(_within, problem, modes, oscillating, _unit(problem, radius)),
+                partial(_within, problem, modes, oscillating, _unit(problem, radius), guesses),
                 _LARGEST_PRECISION,
             )
         except _TooFewError:
@@ -119,9 +126,20 @@ def _analytic(problem: CharacteristicProblem, radius: float) -> bool:
         return problem.determinant.bound(beyond) is not None
 
 
-def _within(problem: CharacteristicProblem, modes: int, oscillating: bool, unit: float) -> list[Eigenvalue]:
+def _within(
+    problem: CharacteristicProblem, modes: int, oscillating: bool, unit: float, guesses: NDArray[np.complex128]
+) -> list[Eigenvalue]:
     disc = Disc.of(problem.flint, problem.determinant, unit, problem.at_zero, problem.symmetric and not problem.squared)
-    roots = disc.approximate()
+    places = (-(guesses**2) if problem.squared else guesses) / unit
+    with suppress(UndecidedError, _TooFewError):
+        return _first(problem, disc, disc.refined(places[places != 0.0]), modes, oscillating)
+    return _first(problem, disc, disc.approximate(), modes, oscillating)
+
+
+def _first(
+    problem: CharacteristicProblem, disc: Disc, roots: Sequence[Any], modes: int, oscillating: bool
+) -> list[Eigenvalue]:
+    """Return the first eigenvalues if the approximate zeros are all there are within a circle."""
     wanted = modes
     while True:
         found = _ordered(problem, disc, _enclosed(problem, disc, roots, wanted, oscillating), modes, oscillating)

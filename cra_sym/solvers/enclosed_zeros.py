@@ -12,7 +12,7 @@ term exceeds the sum of all others and of the rest, so that no zero lies there a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, NamedTuple, Protocol
@@ -22,14 +22,17 @@ from .certificates import UndecidedError
 __all__ = ["INSIDE", "Analytic", "Disc", "Zero"]
 
 _RATIOS = tuple(2.0 ** (k / 4) for k in (0.25, 0.5, 1, 2, 3, 4, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64))
-_MOST_TERMS = 2048
+_MOST_TERMS = 4096
 _MARGIN = 2 / 3  # share of the precision by which the rest lies below the smallest sample
+_ENOUGH = 128  # bits of the precision beyond those of the ratio of samples
 INSIDE = 0.95  # zeros are sought within this share of the disc
 _MOST_TOGETHER = 8
 _NARROW = -60  # exponent of two of the largest relative radius of an enclosure
 _HIGHER = 8  # largest precision for approximate zeros, which may nearly coincide, over that of the function
-_ARCS, _DEEPEST = 16, 40  # parts of a half circle to begin with, and how often one may be halved
-_PROBES = 16
+_STEPS = 60  # of Newton's method, which halves the distance from a double zero
+_SHORT = 48  # coefficients of the product with an exponential
+_ARCS, _DEEPEST = 8, 40  # parts of a half circle to begin with, and how often one may be halved
+_PROBES, _INNER = 16, 1 / 64  # samples on the upper half circle, and one inside, that tell the size of values
 
 
 class Analytic(Protocol):
@@ -116,9 +119,14 @@ class Disc:
             return function.value(flint.acb(share).exp_pi_i() * unit)
 
         sizes = [abs(sample(flint.arb(2 * k + 1) / (2 * _PROBES))) for k in range(_PROBES)]
+        inner = flint.arb(_INNER)
+        sizes.append(abs(function.value(flint.acb(0, inner * unit))) / inner**at_zero)
         if not all(size.is_finite() and size > 0 for size in sizes):
             raise UndecidedError("a sample holds zero")
-        wanted = min(float(_log2(size.lower())) for size in sizes) - _MARGIN * flint.ctx.prec
+        least, most = (pick(float(_log2(size.lower())) for size in sizes) for pick in (min, max))
+        if flint.ctx.prec < most - least + _ENOUGH:
+            raise UndecidedError("the values are of too different size")
+        wanted = least - _MARGIN * flint.ctx.prec
         found = list(_tails(flint, function, unit, wanted))
         if not found:
             raise UndecidedError("the function is not known to be analytic beyond the disc")
@@ -132,8 +140,33 @@ class Disc:
         rest = sum((value.abs_upper() for value in coefficients[:at_zero]), rest)  # of what is exactly 0
         return cls(flint, radius, coefficients[at_zero:], rest.upper(), symmetric)
 
+    def refined(self, guesses: Iterable[complex]) -> list[Any]:
+        """Return zeros of the polynomial that Newton's method finds from guesses, as :meth:`approximate` does.
+
+        Parameters
+        ----------
+        guesses : iterable of complex
+            In the unit of the disc; some zeros may have none. It takes a small part of the time.
+        """
+        flint = self.flint
+        polynomial = flint.acb_poly([value.mid() for value in self.coefficients])
+        slope, close = polynomial.derivative(), flint.arb(2) ** (_NARROW - 20)
+        kept: list[Any] = []
+        for guess in guesses:
+            root = flint.acb(complex(guess))
+            for _ in range(_STEPS):
+                step = (polynomial(root) / slope(root)).mid()
+                root = (root - step).mid()
+                if not abs(step) > close * abs(root):
+                    break
+            tiny = abs(root.imag) < close * abs(root)
+            root = flint.acb(root.real, 0 if tiny else abs(root.imag))
+            if abs(root) < INSIDE and not any(abs(root - other) < close * abs(root) for other in kept):
+                kept.append(root)
+        return sorted(kept, key=lambda root: float(abs(root)))
+
     def approximate(self) -> list[Any]:
-        """Return approximate zeros within the disc by ascending modulus, one of each pair: those of the polynomial."""
+        """Return all zeros of the polynomial within the disc by ascending modulus, one of each conjugate pair."""
         of = self.flint.acb_poly
         try:
             found = of([value.mid() for value in self.coefficients]).roots(
@@ -223,6 +256,29 @@ class Disc:
         of = self.flint.acb_poly
         return list(of(self.coefficients)(of([centre, 1])).coeffs())
 
+    def _turn(self, centre: Any, start: Any, stop: Any, reach: Any) -> Any | None:
+        """Return the change of the argument between two points near a centre; None if there may be a zero near it.
+
+        Times ``exp(-rate h)`` the function is nearly constant there.
+        """
+        flint, values = self.flint, self._about(centre)
+        if not abs(values[0]) > 0:
+            return None
+        rate = (values[1] / values[0]).mid()
+        factor = [flint.acb(1)]
+        for j in range(1, _SHORT):
+            factor.append(-factor[-1] * rate / j)
+        near = list((flint.acb_poly(values[:_SHORT]) * flint.acb_poly(factor)).truncate(_SHORT).coeffs())
+        sizes = [flint.arb_poly([abs(value) for value in part]) for part in (values, values[:_SHORT], factor)]
+        grown = (abs(rate) * reach).exp()
+        left_out = sizes[0](reach) * grown - (sizes[1] * sizes[2]).truncate(_SHORT)(reach) + self.rest * grown
+        others = sum((b.abs_upper() * reach**j for j, b in enumerate(near) if j), left_out.upper())
+        if not others < near[0].abs_lower():
+            return None
+        rest = flint.acb(flint.arb(0, self.rest), flint.arb(0, self.rest))
+        before, after = ((flint.acb_poly(values)(h) + rest) * (-rate * h).exp() for h in (start, stop))
+        return (after / before).arg() + (rate * (stop - start)).imag
+
     def number(self, radius: Any) -> int:
         """Return the proved number of zeros within a radius, in the unit of the disc, those at z = 0 left out.
 
@@ -243,12 +299,9 @@ class Disc:
             start, stop = point(first), point(last)
             centre = ((start + stop) / 2).mid()
             reach = ((abs(stop - start) / 2) * (1 + flint.arb(2) ** -20)).upper()
-            values = self._about(centre)
-            others = sum((b.abs_upper() * reach**j for j, b in enumerate(values) if j), self.rest)
-            if abs(centre) + reach < 1 and others < values[0].abs_lower():
-                before, after = (flint.acb_poly(values)(end - centre) for end in (start, stop))
-                rest = flint.acb(flint.arb(0, self.rest), flint.arb(0, self.rest))
-                turn += ((after + rest) / (before + rest)).arg()
+            change = self._turn(centre, start - centre, stop - centre, reach) if abs(centre) + reach < 1 else None
+            if change is not None:
+                turn += change
             elif depth == _DEEPEST:
                 raise UndecidedError("a zero lies too near to the circle")
             else:
