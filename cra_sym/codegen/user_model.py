@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
+
+import numpy as np
 
 from cra_sym.checks import instance
 from cra_sym.codegen.controllers import Controller
@@ -22,6 +25,7 @@ __all__ = ["KEPT", "model_library", "model_text"]
 
 KEPT = 16  # modes in time
 _MOST = 32  # largest number of parameters in a line of the reference vectors
+_SAME = 1e-6  # relative distance of frequencies that count as equal
 _INSTEAD = "give system= with the model at its values, whose modes are exported as numbers"
 
 
@@ -114,6 +118,7 @@ def _library(written: ModelText, name: str, loop: ModelController | None = None)
     of_drives = "\n".join(" " * 8 + part.strip() for part in (driven, timed, looped) if part)
     check = check.replace("# DRIVEN", of_drives.strip())
     values = sample(written)
+    _check_apart(written, values)
     shown = "\n".join(
         f"    parameters.{field} = {float(value)!r}" for field, value in zip(fields, values, strict=True)
     ).replace("inf", "HUGE * 2.0")
@@ -127,6 +132,19 @@ def _library(written: ModelText, name: str, loop: ModelController | None = None)
     stack = _STACK.replace("NAME", name.upper())
     stack += f"; {written.signals.stack}" if written.signals and written.signals.free else ""
     return Library(name, summary, text + "\n", stated(model), checks, _readme(written, text), written.real, stack=stack)
+
+
+def _check_apart(written: ModelText, values: Sequence[float]) -> None:
+    """Refuse a joined structure that is symmetric: its double frequencies are those of one determinant."""
+    structure = written.form.structure
+    if structure.linked and len(structure.sizes) + structure.coordinates > 2:
+        system = written.model.at(dict(zip(written.names, values, strict=True)))
+        omega = system.natural_frequencies(6)
+        if (np.diff(omega) <= _SAME * omega[1:]).any():
+            raise ValueError(
+                "model: is symmetric, with equal frequencies that exported functions give to half the digits only; "
+                f"{_INSTEAD}"
+            )
 
 
 _STACK = """\

@@ -297,3 +297,19 @@ def test_others_are_refused_and_frozen(name, reason, tmp_path):
     assert "system=" in str(caught.value) and "\n" not in str(caught.value) and not list(tmp_path.iterdir())
     frozen = cra.export("c", tmp_path / "out", system=system(name), input="w", outputs=["v"], modes=2)
     assert "system.c" in frozen.files
+
+
+def test_symmetric_structures_are_refused_and_frozen(tmp_path):
+    """Three equal strings joined by springs have double frequencies, of one determinant."""
+    m, T, k = sp.symbols("m T k", positive=True)
+    parts = [sp.Function(f"u_{i}")(x, t) for i in range(3)]
+    star = cra.Model(
+        sum(m * u.diff(t) ** 2 - T * u.diff(x) ** 2 for u in parts) / 2, fields=parts, x=x, domain=(0, L), t=t,
+        right=-k * sum((u - w) ** 2 for u, w in zip(parts, parts[1:] + parts[:1], strict=True)) / 2,
+        essential=[u.subs(x, 0) for u in parts],
+    )  # fmt: skip
+    with pytest.raises(ValueError, match=r"model: is symmetric, .*give system="):
+        cra.export("python", tmp_path / "out", model=star)
+    given = star.at({"m": 0.3, "T": 5.0, "k": 30.0, "L": 1.0})
+    frozen = cra.export("python", tmp_path / "out", system=given, input=parts[0].subs(x, L), outputs=["u_0"])
+    assert "system.py" in frozen.files
