@@ -31,6 +31,7 @@ _SHORT = 1e-4  # step of a difference of a peak, which has a kink where its time
 _TURN = 1e-3  # the same for a difference by the duration, in rad of the fastest mode
 _TINY = 1e-30  # imaginary part whose square underflows
 _SLOWEST = 1e-5  # rad until the inputs end
+_SILENT = 1e-12  # relative change of a frequency, at least its rounding error, that explains all of a residual
 
 
 @default_floating_point
@@ -67,10 +68,10 @@ def residual_vibration_gradient(
     value : float or ndarray, shape (...)
         As from :func:`residual_vibration`, m.
     gradient : ndarray, shape (..., len(by))
-        In m over the SI unit of the parameter. By an infinite stiffness it is 0. Where the
-        residual of a mode is exactly zero it has a kink, and the mode counts as 0. By a zero stiffness, or an infinite
-        compliance, it is nan where a rigid-body mode would become elastic; it is also nan where the phase of a mode
-        until the stop is below 1e-5 rad, since rounding then destroys the result.
+        In m over the SI unit of the parameter. By an infinite stiffness it is 0. Where the residual of a mode is zero to
+        rounding, as after a move in tune with it, it has a kink, and the mode counts as 0. By a zero stiffness, or an
+        infinite compliance, it is nan where a rigid-body mode would become elastic; it is also nan where the phase of
+        a mode until the stop is below 1e-5 rad, since rounding then destroys the result, and where the value is inf.
 
     Raises
     ------
@@ -99,10 +100,11 @@ def residual_vibration_gradient(
     if coupled:
         for place, name in enumerate(by):
             gradient[..., place] = _coupled(system, histories, found, compliances, name, modes, zeta, field)
-        return value, gradient
+        return value, np.where(np.isfinite(value)[..., None], gradient, np.nan)
     tip = section_place(system, field, lumped=True)
     driven = stopped(system, motion, modes, zeta, tip)
     still: list[Array] = [np.zeros(modes) for _ in driven.names]
+    silent = _silent(driven)
     for place, name in enumerate(by):
         with np.errstate(all="ignore"):
             if name == "duration":  # frequency and duration count by their product alone
@@ -117,8 +119,15 @@ def residual_vibration_gradient(
                 turned = driven.osc.omega * np.asarray(driven.stop)[..., None]
                 held = (stiffness or name) in system.numerics("stiffnesses")
                 rate = np.where(held & (0 < turned) & (turned < _SLOWEST), np.nan, rate)
-        gradient[..., place] = rate.sum(axis=-1)
-    return value, gradient
+        gradient[..., place] = np.where(silent & ~np.isnan(rate), 0.0, rate).sum(axis=-1)
+    return value, np.where(np.isfinite(value)[..., None], gradient, np.nan)
+
+
+def _silent(driven: Stopped) -> NDArray[np.bool_]:
+    """Return which modes are at rest after the stop, to rounding: there their peak has a kink."""
+    with np.errstate(all="ignore"):
+        peaks = driven.peaks(driven.osc.omega * (1 + 1j * _TINY), driven.products)
+        return np.asarray(peaks.real <= _SILENT * np.abs(peaks.imag) / _TINY)
 
 
 def _coupled(

@@ -189,3 +189,30 @@ def test_all_modes_of_two_masses():
     rate = cra.sensitivities(masses, 2, ["k"]).participation("k")
     moved = [cra.modal_parameters(masses.replace(k=40.0 + h), 2).participation for h in (-1e-3, 1e-3)]
     np.testing.assert_allclose(rate, np.subtract(*moved[::-1]) / 2e-3, rtol=1e-6)
+
+
+def test_a_mode_in_tune_with_the_move_counts_as_zero():
+    """Its rounding error had a slope of the size of the others, of either sign; a difference is symmetric about it."""
+    arm = cra.Arm.nominal().replace(k_t=1e3, k_r=50.0)
+    period = 1 / cra.natural_frequencies(arm, 1)[0]
+    move = cra.BaseMotion.trapezoid(0.1, 0.1 / period, 0.3 / period**2)  # brakes three periods after the start
+    alone, slope = cra.residual_vibration_gradient(arm, move, ("k_r", "m_e"), modes=1)
+    assert alone < 1e-14 and (slope == 0.0).all()
+    value, gradient = cra.residual_vibration_gradient(arm, move, ("k_r", "m_e"), modes=3)
+    for name, found in zip(("k_r", "m_e"), gradient, strict=True):
+        size = getattr(arm, name)
+        step = 1e-6 * size
+        beside = [cra.residual_vibration(arm.replace(**{name: size + s * step}), move, modes=3) for s in (-1, 1)]
+        assert found == pytest.approx((beside[1] - beside[0]) / (2 * step), rel=1e-4)
+    assert value > 1e-6
+
+
+def test_what_drifts_away_has_no_gradient():
+    """A force that leaves a free beam with a velocity: its value is inf, and a slope of the elastic modes was given."""
+    force = sp.Function("F")(t)
+    beam = cra.Model(
+        v.diff(t) ** 2 / 2 - 2 * v.diff(x, 2) ** 2, fields=[v], x=x, domain=(0, L), t=t, right=force * v
+    ).at({L: 1.0})  # fmt: skip
+    value, gradient = cra.residual_vibration_gradient(beam, {force: cra.Force.sampled([0.0, 0.1, 0.2], [0.0, 1.0, 0.0],
+                                                                                     exact=True)}, ("L",))  # fmt: skip
+    assert np.isinf(value) and np.isnan(gradient).all()
