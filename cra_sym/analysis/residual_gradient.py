@@ -68,10 +68,10 @@ def residual_vibration_gradient(
     value : float or ndarray, shape (...)
         As from :func:`residual_vibration`, m.
     gradient : ndarray, shape (..., len(by))
-        In m over the SI unit of the parameter. By an infinite stiffness it is 0. Where the residual of a mode is zero to
-        rounding, as after a move in tune with it, it has a kink, and the mode counts as 0. By a zero stiffness, or an
-        infinite compliance, it is nan where a rigid-body mode would become elastic; it is also nan where the phase of
-        a mode until the stop is below 1e-5 rad, since rounding then destroys the result, and where the value is inf.
+        In m over the SI unit of the parameter. By an infinite stiffness it is 0. Where the residual of a mode is zero
+        to rounding, as after a move in tune with it, it has a kink, and the mode counts as 0. By a zero stiffness, or
+        an infinite compliance, it is nan where a rigid-body mode would become elastic; it is also nan where the phase
+        of a mode until the stop is below 1e-5 rad, since rounding then destroys the result, and where the value is inf.
 
     Raises
     ------
