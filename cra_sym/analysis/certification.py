@@ -93,8 +93,9 @@ def certify(system: System, modes: int = 3) -> Certificate:
     Raises
     ------
     TypeError, ValueError
-        If ``system`` is not a :class:`System`, ``modes`` not an integer from 1 to 1000, or the coefficients of the
-        model vary along x between places; and as :func:`natural_frequencies` and :func:`eigenvalues`.
+        If ``system`` is not a :class:`System`, ``modes`` not an integer from 1 to 1000, the coefficients of the model
+        vary along x between places, or one is a function that ball arithmetic lacks; and as
+        :func:`natural_frequencies` and :func:`eigenvalues`.
     MissingExtraError
         If python-flint is not installed (extra ``certify``).
 
@@ -145,8 +146,9 @@ def certify_eigenvalues(system: System, modes: int = 3, *, oscillating: bool = T
     Raises
     ------
     TypeError, ValueError
-        If ``system`` is not a :class:`System`, ``modes`` not an integer from 1 to 1000, or the coefficients of the
-        model vary along x between places; and as :func:`eigenvalues`.
+        If ``system`` is not a :class:`System`, ``modes`` not an integer from 1 to 1000, the coefficients of the model
+        vary along x between places, or one is a function that ball arithmetic lacks; with internal damping also if
+        moduli reach the one at which eigenvalues accumulate; and as :func:`eigenvalues`.
     MissingExtraError
         If python-flint is not installed (extra ``certify``).
 

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
-from sympy import Expr, Float, Function, Matrix, Pow, Rational, S
+from sympy import Expr, Float, Function, Matrix, Rational, S, cos, cosh, exp, log, sin, sinh, tan, tanh
 
 from cra_sym.mechanics.breakpoints import switches
 from cra_sym.mechanics.weak import weak_form
-from cra_sym.model.exact import ExactKernel, ExactMatrix, exact_kernel, exact_matrix
+from cra_sym.model.exact import ExactKernel, ExactMatrix, exact_kernel, exact_matrix, irrational_nodes
 from cra_sym.model.projection import EndParameter
 from cra_sym.model.resolved import resolved
 from cra_sym.model.symmetry import asymmetry, is_gyroscopic, is_symmetric
@@ -30,6 +30,8 @@ __all__ = ["BallLayout", "BallProblem", "BoundProblem", "Pattern", "ball_layout"
 Number = Callable[[int], Any]
 Pattern = tuple[tuple[tuple[int, ...], ...], tuple[tuple[int, ...], ...]]
 """For each cut the numbers of the terms inside that act there; for each span the signs of the switches."""
+_ALLOWED = sin, cos, tan, exp, log, sinh, cosh, tanh
+_NAMES = ", ".join(function.__name__ for function in _ALLOWED)
 _LARGE_PRIME = 2**2203 - 1
 
 
@@ -277,7 +279,7 @@ def ball_problem(model: Model, damped: bool, pattern: Pattern) -> BallProblem:
         varying = next((value for value in values if value.has(x)), None)
         if varying is not None:
             raise _varying(varying)
-        return _rational(values)
+        return _rational(values, _ALLOWED)
 
     def matrix(given: Matrix, part: dict[Expr, int] | None = None) -> ExactMatrix:
         return exact_matrix(Matrix(*given.shape, constant(given, part or {})), z, symbols)
@@ -297,7 +299,7 @@ def ball_problem(model: Model, damped: bool, pattern: Pattern) -> BallProblem:
             for there in acting
         ),
         matrix(form.boundary),
-        exact_kernel(_rational(form.free), symbols),
+        exact_kernel(_rational(form.free, _ALLOWED), symbols),
         not form.damped,
         not asymmetry(form),
         form.damped and is_gyroscopic(exact.linearised),
@@ -349,15 +351,19 @@ def _varying(found: Expr) -> ValueError:
     )
 
 
-def _rational(expressions: Iterable[Expr]) -> list[Expr]:
-    """Return the expressions, refused unless they are rational functions."""
+def _rational(expressions: Iterable[Expr], allowed: Collection[type[Function]] = ()) -> list[Expr]:
+    """Return the expressions, refused unless they are rational functions, or made of the allowed ones and powers."""
     found = list(expressions)
     for entry in found:
-        irrational = sorted(map(str, (a for a in entry.atoms(Function, Pow) if not (a.is_Pow and a.exp.is_Integer))))
-        if irrational:
+        nodes = irrational_nodes(entry)
+        refused = {node for node in nodes if not allowed} | {
+            node for node in entry.atoms(Function) if not isinstance(node, tuple(allowed))
+        }
+        if refused:
+            name = min(map(str, refused))
             raise ValueError(
-                f"system: the coefficients contain {irrational[0]}: certification needs rational functions of the "
-                f"parameters; put a parameter in place of {irrational[0]}"
+                f"system: the coefficients contain {name}: places must be rational functions of the "
+                f"parameters, coefficients may have {_NAMES} and powers too; put a parameter in place of {name}"
             )
     return found
 

@@ -23,7 +23,9 @@ _LARGEST_PRECISION = 12_288
 _NEAREST = -53  # exponent of two of the first relative width tried, twice the target width
 _WIDEST = -8
 _EQUAL = -40  # times the target width: frequencies that are closer share an enclosure
-_SMALL = 1, 8, 32  # exponents of two by which a frequency lies below the first, only rigid-body modes below it
+_SMALL = 7 / 2**4, 7 / 2**12, 7 / 2**36
+"""Of the first frequency: only rigid-body modes lie below one of these. At its half a diagonal entry of the stiffness
+may be exactly zero."""
 
 Result = TypeVar("Result")
 _ALONE = released_in_children(RLock())
@@ -145,9 +147,7 @@ def enclose(flint: Any, problem: Counted, guesses: Iterable[float]) -> list[tupl
     zero, guesses = flint.arb(0), list(guesses)
     with precision(flint, FIRST_PRECISION):
         first = next((guess for guess in guesses if guess > 0.0), 1.0)
-        if problem.zeros and not any(
-            problem.count(flint.arb(first) * flint.arb(2) ** -power) == problem.zeros for power in _SMALL
-        ):
+        if problem.zeros and not any(problem.count(flint.arb(first) * share) == problem.zeros for share in _SMALL):
             raise UndecidedError("there are other motions near zero frequency, or unstable ones")
         return [
             (zero, zero) if number < problem.zeros else _enclosure(flint, problem, number, guess)

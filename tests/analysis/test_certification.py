@@ -122,6 +122,15 @@ clamped = [v.subs(x, 0), v.diff(x).subs(x, 0)]
 moving = beam.subs(v.diff(t), v.diff(t) + w.diff(t))
 
 
+def test_frequencies_at_special_shares_of_the_spectrum_are_decided():
+    """A free rod: at half its first frequency entries of its dynamic stiffness are exactly zero."""
+    proof = cra.certify(cra.Model(
+        HALF * v.diff(t) ** 2 - HALF * T * v.diff(x) ** 2, fields=[v], x=x, domain=(0, 1), t=t
+    ).at({T: 1.0}), 3)  # fmt: skip
+    assert proof.complete and proof.upper[0] == 0.0 and (proof.lower[1:] <= [0.5, 1.0]).all()
+    assert (proof.upper[1:] >= [0.5, 1.0]).all()
+
+
 def systems():
     """Systems with one and several wave numbers, two fields, a lumped coordinate, an offset mass, no support at all."""
     common = {"fields": [v], "x": x, "domain": (0, L), "t": t}
@@ -223,13 +232,31 @@ def test_a_frequency_that_is_a_float_is_enclosed():
     assert proved.complete and (proved.lower < [1.0, 2.0]).all() and (proved.upper > [1.0, 2.0]).all()
 
 
-@pytest.mark.parametrize("factor", [sp.cos, sp.sqrt])
-def test_coefficients_that_are_not_rational_are_refused_by_name(factor):
+@pytest.mark.parametrize("factor", [sp.cos, sp.sqrt, lambda a: sp.exp(-a / 3) + a ** sp.Rational(2, 3)])
+def test_coefficients_may_be_irrational_functions(factor):
+    """A free rod on a spring k factor(a): w tan w = k factor(a); without the spring it moves rigidly."""
     rod, k, a = sp.Function("rod")(x, t), sp.Symbol("k"), sp.Symbol("a")
     energy = rod.diff(t) ** 2 / 2 - rod.diff(x) ** 2 / 2
     made = cra.Model(energy, fields=[rod], x=x, domain=(0, 1), t=t, right=-k * factor(a) * rod**2 / 2)
-    with pytest.raises(ValueError, match=r"system: the coefficients contain .*; put a parameter in place of"):
-        cra.certify(made.at({k: 1.0, a: 0.3}), 1)
+    proof = cra.certify(made.at({k: [1.7, 0.0], a: 0.3}), 2)
+    assert proof.complete.all() and proof.upper[1, 0] == 0.0
+    with mp.workdps(40):
+        stiffness = mp.mpf(1.7) * sp.lambdify(a, factor(a), "mpmath")(mp.mpf(0.3))
+        for low, high in zip(proof.lower[0], proof.upper[0], strict=True):
+            ends = [w * mp.sin(w) - stiffness * mp.cos(w) for w in (2 * mp.pi * mp.mpf(f) for f in (low, high))]
+            assert ends[0] * ends[1] < 0 and high - low < 4 * np.spacing(high)
+
+
+def test_places_and_functions_that_no_ball_takes_are_refused_by_name():
+    rod, k, a = sp.Function("rod")(x, t), sp.Symbol("k"), sp.Symbol("a")
+    energy = rod.diff(t) ** 2 / 2 - rod.diff(x) ** 2 / 2
+    options = {"fields": [rod], "x": x, "domain": (0, 1), "t": t}
+    for made, name in (
+        (cra.Model(energy, right=-k * sp.besselj(0, a) * rod**2 / 2, **options), "besselj"),
+        (cra.Model(energy, right=-k * rod**2 / 2, inside=[(sp.sqrt(a), -k * rod**2 / 2)], **options), "sqrt"),
+    ):
+        with pytest.raises(ValueError, match=rf"system: the coefficients contain {name}.*put a parameter in place of"):
+            cra.certify(made.at({k: 1.0, a: 0.3}), 1)
 
 
 GYROSCOPIC = {"x": x, "domain": (0, L), "t": t}
