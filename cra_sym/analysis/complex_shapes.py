@@ -66,15 +66,18 @@ def resonant_growth(system: System, motion: str, s: Complex, tip: Callable[[Syst
     motion : str
         Name of a prescribed motion.
     s : ndarray of complex, shape (..., modes)
-        Eigenvalues of the modes, some of the lowest, each apart from all others.
+        Eigenvalues of the modes, some of the lowest; those of rigid-body modes, 0, do not grow.
     tip : callable
         ``tip(system, basis)`` returns the output in every coordinate of a basis.
     """
     pencil, loads = system.numerics("pencil"), system.numerics("loads", motion)
     for load in loads.values():
         check_forces(system, load, pencil)
-    columns, found = flat_columns(system.parameters, system.shape), np.empty(s.shape)
-    for row, column, values in zip(found.reshape(-1, s.shape[-1]), columns.T, s.reshape(-1, s.shape[-1]), strict=True):
+    columns, found = flat_columns(system.parameters, system.shape), np.zeros(s.shape)
+    for row, column, whole in zip(found.reshape(-1, s.shape[-1]), columns.T, s.reshape(-1, s.shape[-1]), strict=True):
+        values = whole[whole != 0.0]
+        if not values.size:
+            continue
         one = system.model.at(dict(zip(system.numerics("names"), column, strict=True)))
         ((_, problem),) = pencil.problems(column[:, None])
         motions = _motions(problem, values)
@@ -83,7 +86,7 @@ def resonant_growth(system: System, motion: str, s: Complex, tip: Callable[[Syst
         seen = (tip(one, motions.basis) @ motions.shapes @ vectors)[number]
         forces = sum(np.outer((1j * values.imag) ** order, project(one.domain, motions.basis, load))
                      for order, load in loads.items())  # fmt: skip
-        row[:] = np.abs(seen * ((np.linalg.inv(vectors) @ motions.push)[number] * forces).sum(axis=1))
+        row[whole != 0.0] = np.abs(seen * ((np.linalg.inv(vectors) @ motions.push)[number] * forces).sum(axis=1))
     return found
 
 

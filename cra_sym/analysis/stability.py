@@ -16,6 +16,7 @@ from cra_sym.analysis.modes import displaced, only_motion, participation
 from cra_sym.analysis.zones import Zone, derived, first_order_zone, zone_of
 from cra_sym.kernels import derived_kernel
 from cra_sym.model.excitations import Excitation, Fluctuation, Parametric, TransverseBase
+from cra_sym.model.one_wave import OneWaveModes
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.si import Numbers, paired
 
@@ -187,8 +188,8 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
     Returns
     -------
     ndarray, shape (..., modes)
-        m/s; ``...`` is broadcast from system and excitation. It is nan for complex modes of equal eigenvalues, which
-        are not determined one by one.
+        m/s; ``...`` is broadcast from system and excitation. It is nan for modes of equal frequencies, which are not
+        determined one by one.
 
     Raises
     ------
@@ -214,9 +215,13 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
     acts_by_more = any(kind == "support" for _, kind in system.numerics("causes"))
     if acts_by_more or system.conservative_part is not system:
         return np.asarray(amplitude * _complex_growth(system, only_motion(system, support=acts_by_more), modes))
-    tip = system.modes(modes).displacement(1, 0)
-    width: np.ndarray = _FORCED(system.natural_frequencies(modes), participation(system, modes), tip, 1.0, amplitude)
-    return width
+    found, omega = system.modes(modes), system.natural_frequencies(modes)
+    width: np.ndarray = _FORCED(omega, participation(system, modes), found.displacement(1, 0), 1.0, amplitude)
+    if isinstance(found, OneWaveModes):  # of which no frequency is repeated
+        return width
+    more = system.natural_frequencies(min(modes + 1, system.most_modes))
+    repeated = (omega > 0.0) & (gaps(np.asarray(1j * more, dtype=complex))[..., :modes] <= _SAME * omega)
+    return np.where(repeated, np.nan, width)
 
 
 def _complex_growth(system: System, motion: str, modes: int) -> np.ndarray:
@@ -233,11 +238,8 @@ def _complex_growth(system: System, motion: str, modes: int) -> np.ndarray:
         if bad.any():
             number = int(np.nonzero(bad)[-1].min()) + 1
             raise ValueError(f"system: mode {number} {what}")
-    if not s.any():
-        return np.zeros(s.shape)
-    moving = np.where(s == 0.0, s[..., -1:], s)
-    found = resonant_growth(system, motion, moving, lambda one, basis: displaced(one, basis, 0))
-    return np.where(s == 0.0, 0.0, np.where(apart <= _SAME * np.abs(s), np.nan, found))
+    found = resonant_growth(system, motion, s, lambda one, basis: displaced(one, basis, 0))
+    return np.where((s != 0.0) & (apart <= _SAME * np.abs(s)), np.nan, found)
 
 
 def _resonance(resonance: Any, modes: int) -> tuple[int, int]:

@@ -101,6 +101,14 @@ def test_without_gyroscopic_terms_it_is_that_of_natural_modes():
     ).at({"k": 800.0, "l": 1.2})
     seen = _model(BENT).at({key: VALUES[key] for key in ("k", "l", "rhoA", "EI")})
     np.testing.assert_allclose(cra.forced_width(ground, BASE), cra.forced_width(seen, BASE), rtol=1e-8)
+    assert np.isnan(cra.forced_width(named("two planes", c=5.0, a=0.0), BASE, 1)).all()
+    # two free masses on a spring, one of which is pulled: the rigid-body mode does not grow
+    pulled = cra.Model(
+        sp.S.Zero, fields=(), coordinates=[p, q], prescribed=[w], x=x, domain=(0, 1), t=t,
+        left=m * (p.diff(t) ** 2 + q.diff(t) ** 2) / 2 - k * (p - q) ** 2 / 2 + g * w.diff(t) * q,
+    ).at({"m": 1.0, "k": 2.0, "g": 3.0})  # fmt: skip
+    # of p = -q, of which the force 3 omega on q moves half
+    np.testing.assert_allclose(cra.forced_width(pulled, BASE, 2), [0.0, 3.0 / 2 / 2], rtol=1e-8)
 
 
 def test_what_does_not_grow_is_refused():
