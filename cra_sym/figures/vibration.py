@@ -251,7 +251,7 @@ def figure_input_shaping(
 
 
 def _wrongly_known(system: System, name: str, points: int) -> np.ndarray:
-    """Return factors of a parameter, up to 10 of a stiffness of an end, else 2, or closer to 1 where that is no system.
+    """Return factors of a parameter, up to 10 of a stiffness of an end, else 2, or closer to 1 where no system has it.
 
     Such as a length beyond which an interior place would be.
     """
