@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ import sympy as sp
 from mpmath import mp
 
 import cra_sym as cra
+from cra_sym.model.ball_problem import BallProblem
 from cra_sym.symbols import L, t, v, x
 
 flint = pytest.importorskip("flint", reason="the extra 'certify' brings python-flint")
@@ -311,3 +313,43 @@ def test_what_varies_along_x_is_refused():
     varying = model(BEAM - HALF * T * x * v.diff(x) ** 2, essential=CLAMPED)
     with pytest.raises(ValueError, match=r"constant along x between places, not .*T"):
         cra.certify_eigenvalues(bound(varying))
+
+
+def test_a_wrong_matrix_entry_is_noticed(monkeypatch):
+    """Each entry of the first-order form, spoiled by a part in 1e9, moves the enclosures away from the solver."""
+    system = bound(damped_cantilever())
+    found, made = cra.eigenvalues(system, 2), BallProblem.spanned
+    spoiled = 0
+    for place in range(16):
+
+        def wrong(self, *arguments, place=place):
+            nonlocal spoiled
+            whole = made(self, *arguments)
+            matrix = whole.spans[0].system
+            entries = list(matrix.entries)
+            top, bottom = entries[place]
+            changed = [value + value / 10**9 for value in top]
+            spoiled += any(value != 0 for value in top)
+            entries[place] = changed, bottom
+            return replace(whole, spans=[whole.spans[0]._replace(system=replace(matrix, entries=entries))])
+
+        monkeypatch.setattr(BallProblem, "spanned", wrong)
+        before = spoiled
+        proof = cra.certify_eigenvalues(system, 2)
+        outside = np.abs(found - proof.lower) > 1e-11 * np.abs(found)
+        assert outside.all() == (spoiled > before), place
+    assert spoiled
+
+
+def test_wrong_guesses_prove_nothing_wrong(monkeypatch):
+    """With eigenvalues that are a tenth too large, one twice and one missing, the same is proved."""
+    system = bound(damped_cantilever())
+    right = cra.certify_eigenvalues(system, 3)
+
+    def guess(given, modes, *, oscillating=True):
+        found = cra.eigenvalues(given, modes + 1, oscillating=oscillating)
+        return 1.1 * np.concatenate([found[:1], found[:1], found[2:]])[:modes]
+
+    monkeypatch.setattr("cra_sym.analysis.certification.eigenvalues", guess)
+    proof = cra.certify_eigenvalues(system, 3)
+    assert proof.complete and (proof.lower == right.lower).all() and (proof.upper == right.upper).all()
