@@ -11,7 +11,11 @@ import sympy as sp
 from mpmath import mp
 
 import cra_sym as cra
+from cra_sym.analysis.certification import _characteristic
 from cra_sym.model.ball_problem import BallProblem
+from cra_sym.model.ball_problem import bound as bound_problem
+from cra_sym.solvers.certificates import precision
+from cra_sym.solvers.eigenvalue_enclosures import first_eigenvalues
 from cra_sym.symbols import L, t, v, x
 
 flint = pytest.importorskip("flint", reason="the extra 'certify' brings python-flint")
@@ -353,3 +357,23 @@ def test_wrong_guesses_prove_nothing_wrong(monkeypatch):
     monkeypatch.setattr("cra_sym.analysis.certification.eigenvalues", guess)
     proof = cra.certify_eigenvalues(system, 3)
     assert proof.complete and (proof.lower == right.lower).all() and (proof.upper == right.upper).all()
+
+
+def test_two_proofs_of_a_conservative_system_agree():
+    """By the signature of the dynamic stiffness, and by the zeros of the determinant, in spans with a mass inside."""
+    beam = model(
+        HALF * rho * v.diff(t) ** 2 - HALF * EI * (1 + 2 * sp.Heaviside(x - a)) * v.diff(x, 2) ** 2,
+        essential=[v.subs(x, 0)], inside=[(HALF * L, HALF * m * v.diff(t) ** 2)],
+    )  # fmt: skip
+    system = bound(beam)
+    one = cra.certify(system, 4)
+    values = {name: VALUES[name] for name in system.numerics("names")}
+    problem = _characteristic(flint, bound_problem(flint, system.numerics, {}, values, damped=True))
+    assert problem.rigid == problem.at_zero == 1 and problem.squared  # it turns about its support
+    guesses = 2j * np.pi * one.lower
+    other = first_eigenvalues(problem, 3, True, float(np.abs(guesses).max()), guesses)
+    assert one.complete and one.upper[0] == 0.0
+    with precision(flint, 128):
+        for low, high, found in zip(one.lower[1:], one.upper[1:], other, strict=True):
+            frequency = found.imag / (2 * flint.arb.pi())
+            assert flint.arb(float(low)) <= frequency <= flint.arb(float(high)) and found.real == 0
