@@ -240,7 +240,7 @@ class Sensitivities:
         if name in self._system.numerics("moving_supports"):
             rate = 2 * self._omega * rates_by_moved_supports(self._system, name, self._modes)
         elif direct is None:
-            rate = self._forms[f"{name} stiffness"] - self._omega**2 * self._forms[f"{name} mass"]
+            rate = self._forms[f"{name} stiffness"] - self._forms[f"{name} mass"] * self._omega * self._omega
             rate = rate + self._system.numerics("held_motions").rate(self._system, name, self._modes)
         else:
             rate = direct
@@ -313,7 +313,7 @@ class Sensitivities:
             rate = modes.rates(kind, cycles=True)[channel]
             return self._at_rest(rate if (factor == 1).all() else factor * rate, name)
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            value = self._squared(name) / (8 * np.pi**2 * self.frequency)  # d omega^2 = 8 pi^2 f df
+            value = self._squared(name) / self._omega / (4 * np.pi)
         return self._at_rest(value, name)
 
     @default_floating_point
@@ -329,7 +329,7 @@ class Sensitivities:
             given = np.asarray(self._system.values[name])
             finite = column(np.where(np.isinf(given), 0.0, given))
             with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-                value = finite * self._squared(name) / (2 * self._omega**2)
+                value = self._squared(name) / self._omega / self._omega * (0.5 * finite)
         return np.where(self._still, np.nan, value) if self._loose else value
 
     def _at_an_end(self, name: str) -> tuple[OneWaveModes, Change, tuple[int, int], Array] | None:

@@ -381,15 +381,16 @@ class Projected:
         axes = 1 if self._diagonal else 2
         unit = np.ones(self._modes.omega.shape[-1]) if self._diagonal else np.eye(self._modes.omega.shape[-1])
         squares = self._modes.omega**2 if self._diagonal else self._modes.omega[..., None] ** 2 * unit
-        left = []
-        for number, whole in ((k, squares), (m, unit + 0 * squares)):
+        left = squares, np.array(np.broadcast_to(unit, squares.shape))
+        for number, whole in zip((k, m), left, strict=True):
             for factor, product in zip(self._points[number], self._ends, strict=True):
                 if not _is_zero(factor):
-                    whole = whole - column(factor, axes) * product
-            left.append(whole)
+                    whole -= column(factor, axes) * product
         (a, *b), (c, *d) = (tuple(column(f, axes) for f in self._density[number]) for number in (k, m))
         if not b:  # the same displacement occurs in stiffness and mass
             return [left[1] / c]
+        if _is_zero(b[0]) and _is_zero(c):  # in place: fresh memory costs more than the quotients
+            return [np.divide(whole, factor, out=whole) for whole, factor in zip(left, (a, d[0]), strict=True)]
         determinant = a * d[0] - b[0] * c
         return [(left[0] * d[0] - left[1] * b[0]) / determinant, (left[1] * a - left[0] * c) / determinant]
 
