@@ -16,10 +16,10 @@ from cra_sym.extras import require
 from cra_sym.model.ball_problem import BoundProblem, bound
 from cra_sym.model.system import MOST_MODES, System
 from cra_sym.solvers.ball_determinant import BallDeterminant
-from cra_sym.solvers.ball_spans import static_solutions
+from cra_sym.solvers.ball_spans import multiplicity, static_solutions
 from cra_sym.solvers.ball_stiffness import BallStiffness
 from cra_sym.solvers.certificates import UndecidedError, enclose, outward, precision
-from cra_sym.solvers.eigenvalue_enclosures import CharacteristicProblem, Eigenvalue, first_eigenvalues
+from cra_sym.solvers.eigenvalue_enclosures import AmbiguousError, CharacteristicProblem, Eigenvalue, first_eigenvalues
 
 __all__ = ["Certificate", "EigenvalueCertificate", "certify", "certify_eigenvalues"]
 
@@ -169,7 +169,12 @@ def certify_eigenvalues(system: System, modes: int = 3, *, oscillating: bool = T
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
     instance("oscillating", oscillating, bool)
-    guesses = eigenvalues(system, modes, oscillating=oscillating)
+    try:
+        guesses = eigenvalues(system, modes, oscillating=oscillating)
+    except (ValueError, ArithmeticError):
+        if oscillating:
+            raise
+        guesses = eigenvalues(system, modes)  # larger ones: their error alone may be small enough
     (lower, upper), complete = _proved(system, guesses, damped=True, oscillating=oscillating, unit=1.0)
     return EigenvalueCertificate(lower, upper, complete)
 
@@ -201,7 +206,7 @@ def _proved(
             found = _by_count(flint, problem, guesses[index]) or first_eigenvalues(
                 _characteristic(flint, problem), modes, oscillating, float(np.abs(guesses[index]).max()), near[index]
             )
-        except UndecidedError:
+        except (UndecidedError, AmbiguousError):
             continue
         assert len(found) == modes
         with precision(flint, 128):
@@ -244,14 +249,16 @@ def _by_count(flint: Any, problem: BoundProblem, guesses: NDArray[np.complex128]
 
 def _characteristic(flint: Any, problem: BoundProblem) -> CharacteristicProblem:
     """Return the problem with its motions at s = 0, each the beginning of a Jordan chain."""
-    of = problem.problem
-    rigid = at_zero = static_solutions(flint, problem.exact)
-    order, before = 2, 0
-    while before != at_zero:
-        before, at_zero = at_zero, static_solutions(flint, problem.exact.jets(order))
-        order += 1
+    of, exact = problem.problem, problem.exact
+    rigid = static_solutions(flint, exact)
+    at_zero = multiplicity(flint, exact, rigid)
     determinant = BallDeterminant(flint, problem.balls)
     signature = BallStiffness(flint, problem.balls, rigid).signature if of.dissipative else None
+
+    def at(point: Any) -> int:
+        shifted = exact.shifted(point)
+        return multiplicity(flint, shifted, static_solutions(flint, shifted))
+
     return CharacteristicProblem(
-        flint, determinant, of.squared, of.gyroscopic or problem.exact.even, rigid, at_zero, signature
+        flint, determinant, of.squared, of.gyroscopic or exact.even, rigid, at_zero, at, signature
     )

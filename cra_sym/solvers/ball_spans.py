@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
-__all__ = ["EnergyTerm", "Node", "RationalMatrix", "Span", "Spanned", "static_solutions"]
+__all__ = ["EnergyTerm", "Node", "RationalMatrix", "Span", "Spanned", "multiplicity", "static_solutions"]
 
 Rows = list[list[Any]]
 
@@ -65,6 +65,10 @@ class RationalMatrix:
             found.append(size)
         return self._rows(found)
 
+    def shifted(self, point: Any) -> RationalMatrix:
+        """Return the matrix as a function of the distance of the parameter from a point."""
+        return RationalMatrix(self.columns, [(_about(p, point), _about(q, point)) for p, q in self.entries])
+
     def series(self, order: int) -> list[Rows]:
         """Return the first coefficients of the power series of the matrix about zero, one matrix for each power."""
         entries = []
@@ -83,6 +87,15 @@ def _horner(coefficients: Sequence[Any], z: Any) -> Any:
     for coefficient in reversed(lower):
         value = value * z + coefficient
     return value
+
+
+def _about(coefficients: Sequence[Any], point: Any) -> list[Any]:
+    """Return the coefficients of a polynomial in the distance from a point, by repeated division."""
+    found = list(coefficients)
+    for first in range(len(found) - 1):
+        for k in range(len(found) - 2, first - 1, -1):
+            found[k] = found[k] + point * found[k + 1]
+    return found
 
 
 class Span(NamedTuple):
@@ -179,6 +192,19 @@ class Spanned:
         whole = [_sum(force, more) for force, more in zip(inner, _times(at(self.boundary), still), strict=True)]
         return rows + _times(columns, whole) + held
 
+    def _each(self, change: Callable[[RationalMatrix], RationalMatrix]) -> Spanned:
+        """Return the problem with all matrices changed."""
+        return replace(
+            self,
+            spans=[span._replace(system=change(span.system)) for span in self.spans],
+            nodes=[node._replace(forces=[change(one) for one in node.forces]) for node in self.nodes],
+            boundary=change(self.boundary),
+        )
+
+    def shifted(self, point: Any) -> Spanned:
+        """Return the problem with the distance of the parameter from a point as its parameter."""
+        return self._each(lambda matrix: matrix.shifted(point))
+
     def jets(self, order: int) -> Spanned:
         """Return the problem of the first coefficients of motions that are power series in the parameter, at zero.
 
@@ -201,13 +227,15 @@ class Spanned:
         def several(places: tuple[int, ...]) -> tuple[int, ...]:
             return tuple(place * order + a for place in places for a in range(order))
 
-        return Spanned(
-            self.displacements * order,
-            self.coordinates * order,
-            [span._replace(system=block(span.system)) for span in self.spans],
-            [Node([block(one) for one in node.forces], several(node.held)) for node in self.nodes],
-            block(self.boundary),
-            [[value if a == b else 0 for value in c for a in range(order)] for c in self.free for b in range(order)],
+        whole = self._each(block)
+        return replace(
+            whole,
+            displacements=self.displacements * order,
+            coordinates=self.coordinates * order,
+            nodes=[node._replace(held=several(node.held)) for node in whole.nodes],
+            free=[
+                [value if a == b else 0 for value in c for a in range(order)] for c in self.free for b in range(order)
+            ],
         )
 
 
@@ -236,6 +264,24 @@ def static_solutions(flint: Any, problem: Spanned) -> int:
 
     rows = problem.conditions(lambda matrix: matrix.at(flint.fmpq(0)), carried) + extra
     return len(rows[0]) - of(rows).rank() if rows and rows[0] else 0
+
+
+def multiplicity(flint: Any, problem: Spanned, at_least: int) -> int:
+    """Return the multiplicity of z = 0 as an eigenvalue, of solutions that are polynomials in x: a lower bound of all.
+
+    Parameters
+    ----------
+    flint : module
+    problem : Spanned
+        In fractions (fmpq).
+    at_least : int
+        The number of these solutions.
+    """
+    before, found, order = 0, at_least, 2
+    while before != found:
+        before, found = found, static_solutions(flint, problem.jets(order))
+        order += 1
+    return found
 
 
 def _sum(row: Sequence[Any], other: Sequence[Any]) -> list[Any]:

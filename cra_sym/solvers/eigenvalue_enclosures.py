@@ -9,8 +9,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,13 +20,15 @@ from .ball_determinant import BallDeterminant
 from .certificates import FIRST_PRECISION, UndecidedError, decided, precision
 from .enclosed_zeros import INSIDE, Disc, Zero
 
-__all__ = ["CharacteristicProblem", "Eigenvalue", "first_eigenvalues"]
+__all__ = ["AmbiguousError", "CharacteristicProblem", "Eigenvalue", "first_eigenvalues"]
 
 _LARGEST_PRECISION = 1536
 _WIDER, _MOST_WIDER = 1.5, 12  # factor of the radius where it holds too few eigenvalues, and how often
 _AROUND = 1.3, 1.15, 1.07  # first radius over the largest modulus expected, the largest that is possible
 _SINGULAR = 1.1  # of a larger disc on which the coefficients must be finite
 _CLEAR = -30  # exponent of two of the relative distance of enclosures from the circle
+_SIMPLE = 2**60  # largest denominator of a fraction that zeros may coincide at
+_DECIDING = 512  # bits
 _GAP = 1e-4  # relative distance of moduli between which the circle passes
 
 
@@ -35,6 +38,10 @@ class Eigenvalue(NamedTuple):
     real: Any
     imag: Any
     oscillating: bool
+
+
+class AmbiguousError(ArithmeticError):
+    """Zeros coincide that may be real or a conjugate pair."""
 
 
 class _TooFewError(Exception):
@@ -55,6 +62,8 @@ class CharacteristicProblem:
         Whether eigenvalues s are symmetric about the imaginary axis.
     rigid, at_zero : int
         Number of motions at s = 0, and multiplicity of that zero of the determinant.
+    multiplicity : callable
+        Returns a proved lower bound of the multiplicity of an eigenvalue at a value of the parameter (fmpq).
     signature : callable or None
         Of a problem that is symmetric at real s: returns the number of negative eigenvalues of its dynamic stiffness.
     """
@@ -65,6 +74,7 @@ class CharacteristicProblem:
     symmetric: bool
     rigid: int
     at_zero: int
+    multiplicity: Callable[[Any], int]
     signature: Callable[[Any], int] | None = None
 
 
@@ -91,6 +101,8 @@ def first_eigenvalues(
     ------
     UndecidedError
         If that is not proved at 1536 bits.
+    AmbiguousError
+        If zeros coincide that may be real or a pair.
     ValueError
         If a coefficient may be infinite at such moduli.
     """
@@ -221,8 +233,8 @@ def _eigenvalues(problem: CharacteristicProblem, disc: Disc, zero: Zero) -> Iter
     ball = (zero.centre + flint.acb(around, exact if zero.real else around)) * flint.arb(disc.radius)
     on_axis = zero.centre.imag == 0
     if problem.squared:
-        if on_axis and not zero.real and not ball.real > 0:
-            raise UndecidedError("zeros may be real or a pair")
+        if on_axis and not zero.real and not ball.real > 0 and not _all_real(problem, disc, zero):
+            _refuse(problem)
         if on_axis and ball.real > 0:
             root = ball.sqrt()  # s = i omega
             yield Eigenvalue(exact if zero.real else -root.imag, root.real, True)
@@ -234,7 +246,7 @@ def _eigenvalues(problem: CharacteristicProblem, disc: Disc, zero: Zero) -> Iter
             yield from (Eigenvalue(root.real, -root.imag, True), Eigenvalue(-root.real, -root.imag, True))
     elif on_axis:
         if not zero.real and not _all_real(problem, disc, zero):
-            raise UndecidedError("zeros may be real or a pair")
+            _refuse(problem)
         yield Eigenvalue(ball.real, exact, False)
     else:
         upright = problem.symmetric and zero.centre.real == 0 and zero.number == 1
@@ -242,10 +254,23 @@ def _eigenvalues(problem: CharacteristicProblem, disc: Disc, zero: Zero) -> Iter
 
 
 def _all_real(problem: CharacteristicProblem, disc: Disc, zero: Zero) -> bool:
-    """Return whether all zeros about a real point are real: as many as the signature changes by."""
-    if problem.signature is None:
+    """Return whether all zeros about a real point are real: as many as the signature changes by, or equal fractions."""
+    flint = problem.flint
+    reach = zero.radius * (1 - flint.arb(2) ** _CLEAR)
+    if problem.signature is not None:
+        ends = [((zero.centre.real + side * reach) * disc.radius).mid() for side in (-1, 1)]
+        first, last = map(problem.signature, ends)
+        if abs(first - last) == zero.number:
+            return True
+    mantissa, exponent = (zero.centre.real * disc.radius).mid().man_exp()
+    near = (Fraction(int(mantissa)) * Fraction(2) ** int(exponent)).limit_denominator(_SIMPLE)
+    point = flint.fmpq(near.numerator, near.denominator)
+    if not abs(flint.arb(point) / disc.radius - zero.centre.real) < reach:
         return False
-    reach = zero.radius * (1 - problem.flint.arb(2) ** _CLEAR)
-    ends = [((zero.centre.real + side * reach) * disc.radius).mid() for side in (-1, 1)]
-    first, last = map(problem.signature, ends)
-    return abs(first - last) == zero.number
+    return problem.multiplicity(point) >= zero.number
+
+
+def _refuse(problem: CharacteristicProblem) -> NoReturn:
+    """Raise the error of coinciding zeros that are real or a pair: a higher precision decides that once, if at all."""
+    kind = UndecidedError if problem.flint.ctx.prec < _DECIDING else AmbiguousError
+    raise kind("zeros that coincide may be real or a pair")

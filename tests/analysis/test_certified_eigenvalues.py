@@ -377,3 +377,26 @@ def test_two_proofs_of_a_conservative_system_agree():
         for low, high, found in zip(one.lower[1:], one.upper[1:], other, strict=True):
             frequency = found.imag / (2 * flint.arb.pi())
             assert flint.arb(float(low)) <= frequency <= flint.arb(float(high)) and found.real == 0
+
+
+@pytest.mark.parametrize("form", ["critically damped", "follower"])
+def test_zeros_that_coincide_at_a_fraction_are_real(form):
+    """m q'' + c q' + k q with c^2 = 4 m k; a free column with follower forces at both ends, in a fluid."""
+    if form == "critically damped":
+        q = sp.Function("q")(t)
+        single = model(
+            0, fields=(), coordinates=[q], domain=(0, 1), left=m * q.diff(t) ** 2 / 2 - k * q**2 / 2,
+            virtual_work=[(-c * q.diff(t), q, None)],
+        )  # fmt: skip
+        for change in (0.0, 2.0**-52):  # beyond it there are two, the slower one first
+            proof = cra.certify_eigenvalues(single.at({m: 0.75, k: 3.0, c: 3.0 * (1 + change)}), 1, oscillating=False)
+            assert proof.complete and abs(proof.lower[0] + 2.0) < 1e-7
+            assert (proof.lower[0].real <= -2.0 <= proof.upper[0].real) == (change == 0.0)
+        return
+    ends = [(-P * v.diff(x), v, "right"), (P * v.diff(x), v, "left"), (-c * v.diff(t), v, "domain")]
+    column = bound(model(BEAM + HALF * P * v.diff(x) ** 2, virtual_work=ends), P=5.0)
+    proof = check(column, 2, None)
+    rate = VALUES["c"] / VALUES["rho"]
+    every = cra.certify_eigenvalues(column, 5, oscillating=False)
+    assert every.complete and (every.lower[:2] == 0.0).all() and (every.lower[4:] == proof.lower[:1]).all()
+    np.testing.assert_allclose(every.lower[2:4], -rate, rtol=1e-15)
