@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from cra_sym.analysis.fit_rates import frequencies, rated
 from cra_sym.analysis.fit_unknowns import RatedFrequencies, Unknown
+from cra_sym.model.routes import Estimated
 from cra_sym.model.system import System
 
 __all__ = ["Data", "Search"]
@@ -187,14 +188,20 @@ class Search:
             number = np.isfinite(finite).sum()
             if not number:
                 raise ValueError("system: it has no natural frequencies for any values of the unknown parameters")
-            found |= set(np.argsort(finite)[: min(lowest or (_FEW // 3 if self._slow else _LOWEST), number)].tolist())
+            found |= set(np.argsort(finite)[: min(lowest or self._most_starts, number)].tolist())
             found |= set(_lowest(finite.reshape(shape))) if shape else set()
         return places[sorted(found)]
 
     @property
-    def _slow(self) -> bool:
-        """Whether an evaluation is expensive: some values give no stable structure, or there are no natural modes."""
-        return self.system.conservative_part is not self.system or not np.isfinite(self._grid()[1]).all()
+    def _most_starts(self) -> int:
+        """Number of lowest grid points that are starts: fewer where evaluations are expensive.
+
+        They are without natural modes, and where some values give no stable structure; less so where frequencies are
+        not the roots of a determinant of few waves.
+        """
+        if self.system.conservative_part is not self.system or not np.isfinite(self._grid()[1]).all():
+            return _FEW // 3
+        return _FEW if isinstance(self.system.numerics("route"), Estimated) else _LOWEST
 
     def _descended(self, places: Array, data: Data) -> Array:
         """Follow all starts at once; return those that end apart, the lowest of each group."""
