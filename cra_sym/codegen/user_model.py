@@ -135,9 +135,9 @@ def _library(written: ModelText, name: str, loop: ModelController | None = None)
 
 
 def _check_apart(written: ModelText, values: Sequence[float]) -> None:
-    """Refuse a joined structure that is symmetric: its double frequencies are those of one determinant."""
+    """Refuse a structure of parts joined symmetrically: its double frequencies are those of one determinant."""
     structure = written.form.structure
-    if structure.linked and len(structure.sizes) + structure.coordinates > 2:
+    if max(structure.sizes) > 2 or (structure.linked and len(structure.sizes) + structure.coordinates > 2):
         system = written.model.at(dict(zip(written.names, values, strict=True)))
         omega = system.natural_frequencies(6)
         if (np.diff(omega) <= _SAME * omega[1:]).any():

@@ -47,7 +47,7 @@ from cra_sym.solvers.waves_rates import (
     root_rates,
     slope_formulas,
 )
-from cra_sym.solvers.waves_static import idle_coordinates, negative_motions
+from cra_sym.solvers.waves_static import equal_waves, idle_coordinates, negative_motions
 
 if TYPE_CHECKING:
     from sympy import Symbol
@@ -143,21 +143,27 @@ class Waves:
         """Fill in the squared frequencies of some sets of values."""
         modes = squares.shape[1]
         problem, simple = self._covered(columns)
-        if simple.all():
-            squares[...] = lowest_waves(problem, modes, search, self._functions)
-        elif simple.any():
-            part = problem.take(np.flatnonzero(simple))
-            squares[simple] = lowest_waves(part, modes, search, self._functions)
-        if simple.any() and self.structure.linked and len(self.structure.sizes) + self.structure.coordinates > 2:
-            # symmetric structures have double roots, which one determinant gives to half the digits
-            some = np.flatnonzero(simple)
-            k, zeros = problem.take(some).coefficients(), np.zeros(some.size, dtype=np.int64)
-            function = Determinant(k, self.structure, self._functions, zeros)
-            counted = compiled(*_parts(self.structure, self.known)()).counts if search else None
-            simple[some] = ~_close(squares[some].T, function, counted).any(axis=0)
+        if simple.any():
+            some = slice(None) if simple.all() else np.flatnonzero(simple)
+            part = problem if simple.all() else problem.take(np.flatnonzero(simple))
+            found = squares[some] = lowest_waves(part, modes, search, self._functions)
+            simple[some] = ~self._doubtful(part, found, compiled_too=search is not None)
         if not simple.all():
             rest = columns[:, ~simple]
             squares[~simple] = self._general.angular_frequencies(list(rest), rest.shape[1:], modes) ** 2
+
+    def _doubtful(self, problem: UniformProblem, squares: Array, *, compiled_too: bool) -> NDArray[np.bool_]:
+        """Return where symmetry may cost the closed forms digits or roots, which the dynamic stiffness does not lose.
+
+        Waves inside may be equal; and double roots of parts that are joined are those of one determinant.
+        """
+        found = equal_waves(problem, squares[:, -1])
+        if self.structure.linked and len(self.structure.sizes) + self.structure.coordinates > 2:
+            zeros = np.zeros(len(squares), dtype=np.int64)
+            function = Determinant(problem.coefficients(), self.structure, self._functions, zeros)
+            counted = compiled(*_parts(self.structure, self.known)()).counts if compiled_too else None
+            found |= _close(squares.T, function, counted).any(axis=0)
+        return found
 
     def rates(
         self, values: Values, shape: tuple[int, ...], omega: Array, positions: Sequence[int]
@@ -199,7 +205,7 @@ class Waves:
     ) -> bool:
         """Fill in the rates for some sets of values; return whether their frequencies are roots of the determinant."""
         problem, simple = self._covered(columns)
-        if not simple.all():
+        if not simple.all() or equal_waves(problem, z[:, -1]).any():
             return False
         rows, modes = z.shape
         function = Determinant(problem.coefficients(), self.structure, self._functions, np.zeros(rows, dtype=np.int64))
@@ -224,9 +230,9 @@ class Waves:
         """Return the modes of all the first frequencies."""
         columns = flat_columns(values, shape)
         problem, simple = self._covered(columns)
-        if not simple.all():
-            return self._general.modes(values, shape, omega)
         z = omega.reshape(-1, omega.shape[-1]) ** 2
+        if not simple.all() or equal_waves(problem, z[:, -1]).any():
+            return self._general.modes(values, shape, omega)
         blocks = [slice(start, start + _SHAPES_BLOCK) for start in range(0, max(len(z), 1), _SHAPES_BLOCK)]
         shapes = [WaveShapes(problem.take(block), z[block]) for block in blocks]
         return StateModes(omega, self.spatial, columns, partial(self._states, columns, shapes))

@@ -11,8 +11,12 @@ from numpy.typing import NDArray
 from .waves_kernel import minors
 from .waves_problem import Floats, Integers, UniformProblem, ranks
 
-__all__ = ["are_semidefinite", "coupled", "idle_coordinates", "negative_energy", "negative_motions", "rigid_motions"]
+__all__ = [
+    "are_semidefinite", "coupled", "equal_waves", "idle_coordinates", "negative_energy", "negative_motions",
+    "rigid_motions",
+]  # fmt: skip
 
+_EQUAL = 1e-5  # relative distance of squared wave numbers that count as equal
 _SMALL = 3  # matrices up to this size are tested by their principal minors
 
 
@@ -132,3 +136,41 @@ def are_semidefinite(matrices: Floats) -> NDArray[np.bool_]:
             scale = reduce(np.multiply, [np.abs(entries[i][i]) for i in range(size)])
             every &= minors(entries)[0] >= (0.0 if size == 1 else -1e-14 * scale)
     return every
+
+
+def equal_waves(problem: UniformProblem, z: Floats) -> NDArray[np.bool_]:
+    """Return for which rows two waves that are coupled inside have next to the same wave number at any frequency.
+
+    So have equal strings without a layer between them, or three in a symmetric layer: the formulas then divide by next
+    to zero.
+
+    Parameters
+    ----------
+    problem : UniformProblem
+    z : ndarray, shape (rows,)
+        A squared frequency of each row, rad^2/s^2.
+    """
+    found, start = np.zeros(len(z), dtype=bool), 0
+    for size in problem.structure.sizes:
+        block, start = slice(start, start + size), start + size
+        if size > 2 or len(set(problem.odd[block])) < size:  # a displacement and its slope have other waves
+            found |= np.logical_and(*(_discriminants_vanish(problem, block, share * z) for share in (1.0, 0.37)))
+    return found
+
+
+def _discriminants_vanish(problem: UniformProblem, block: slice, z: Floats) -> NDArray[np.bool_]:
+    """Return where two of the squared wave numbers of a block are next to equal, relative to the largest."""
+    one, other = (
+        part[0][:, block, block] + z[:, None, None] * part[1][:, block, block]
+        for part in (problem.odd_by_even, problem.even_by_odd)
+    )
+    matrix = one @ other
+    trace = np.trace(matrix, axis1=1, axis2=2)
+    square = 0.5 * (trace**2 - np.einsum("rij,rji->r", matrix, matrix))  # sum of products of two
+    if matrix.shape[1] == 2:
+        return np.asarray(np.abs(trace**2 - 4 * square) <= _EQUAL**2 * np.maximum(trace**2, 4 * np.abs(square)))
+    product = np.linalg.det(matrix)
+    apart = (trace * square) ** 2 - 4 * square**3 - 4 * trace**3 * product
+    apart += 18 * trace * square * product - 27 * product**2
+    size = np.maximum(np.maximum(np.abs(trace), np.sqrt(np.abs(square))), np.cbrt(np.abs(product)))
+    return np.asarray(np.abs(apart) <= _EQUAL**2 * size**6)

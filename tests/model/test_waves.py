@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 import sympy as sp
+from scipy.optimize import brentq
 
 import cra_sym as cra
 from cra_sym.kernels import compiled, has_compiler
@@ -198,6 +199,34 @@ def test_a_star_of_strings_and_two_planes_with_a_carriage_have_double_frequencie
         np.testing.assert_allclose(both_planes.natural_frequencies(number), expected, rtol=1e-12)
     for system in (star, both_planes):
         np.testing.assert_allclose(system.form("rates", 6)["mass"], np.eye(6), atol=1e-10)
+
+
+@pytest.mark.parametrize("number", [2, 3])
+def test_equal_strings_in_a_layer_have_equal_waves(number):
+    """T q^2 = m w^2 - number K for all motions but the common one; of two strings without a layer both are the same."""
+    strings = [sp.Function(f"v_{i}")(x, t) for i in range(number)]
+    pairs = [(one, other) for i, one in enumerate(strings) for other in strings[:i]]
+    layered = model(
+        sum(m * one.diff(t) ** 2 / 2 - T * one.diff(x) ** 2 / 2 for one in strings)
+        - K * sum((one - other) ** 2 for one, other in pairs) / 2,
+        strings, None, -k * sum(one**2 for one in strings) / 2, *(one.subs(x, 0) for one in strings),
+    )  # fmt: skip
+    layers = [0.0, 1e-6, 2.0] if number == 2 else [3.0, 20.0]
+    system = layered.at({name: GIVEN[name] for name in ("m", "T", "k", "L")} | {"K": layers})
+    wave = [
+        brentq(lambda q: GIVEN["T"] * q * np.cos(q) + GIVEN["k"] * GIVEN["L"] * np.sin(q), (j - 0.5) * np.pi, j * np.pi,
+               xtol=1e-14) for j in (1, 2, 3, 4)
+    ]  # fmt: skip
+    common = GIVEN["T"] / GIVEN["m"] * (np.array(wave) / GIVEN["L"]) ** 2
+    for layer, omega in zip(layers, system.natural_frequencies(5), strict=True):
+        apart = np.repeat(common + number * layer / GIVEN["m"], number - 1)
+        expected = np.sort(np.concatenate([common, apart]))[:5]
+        np.testing.assert_allclose(omega**2, expected, rtol=1e-12)
+    for layer in layers:
+        alone = system.replace(K=layer)
+        assert alone.check(4).agree
+        # shapes of frequencies at a distance are known to rounding over that distance
+        np.testing.assert_allclose(alone.form("rates", 5)["mass"], np.eye(5), atol=1e-6)
 
 
 @pytest.mark.parametrize("number", [1, 2, 3])
