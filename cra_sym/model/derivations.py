@@ -10,7 +10,7 @@ from cra_sym.kernels import Kernel, kernel
 from cra_sym.mechanics.breakpoints import derivative
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm, weak_form
-from cra_sym.model.ball_problem import ball_layout, ball_problem
+from cra_sym.model.ball_coefficients import ball_layout, ball_problem
 from cra_sym.model.breaks import Breaks, breaks
 from cra_sym.model.conservative_part import beside, conservative_part, elastic_part, stiffness_beside
 from cra_sym.model.driven import driven, driven_coordinate, driven_displacement, driven_spatial, pushed
