@@ -307,21 +307,24 @@ def _contracted(
 
     Axes of one kind are alike, so that those are taken which need not be moved.
     """
-    samples, n = q.shape
+    samples = len(q)
     found: Array = tensor.reshape(1, *tensor.shape)
-    for _ in range(with_v):
-        found = _last(found, v, n)
+    if with_v:
+        found = _last(found, v, with_v)
     if with_q and kept_v:
         axis = 2 if equation else 1  # coordinates come first, after the equation
         found = np.moveaxis(found, range(axis, axis + with_q), range(found.ndim - with_q, found.ndim))
-    for _ in range(with_q):
-        found = _last(found, q, n)
+    if with_q:
+        found = _last(found, q, with_q)
     return found if len(found) == samples else np.broadcast_to(found, (samples, *found.shape[1:]))
 
 
-def _last(found: Array, vector: Array, n: int) -> Array:
-    """Contract the last axis with a vector at every sample."""
-    shape = found.shape[1:-1]
-    if found.shape[0] == 1:  # the same tensor at all samples: one product of matrices
-        return (vector @ found.reshape(-1, n).T).reshape(len(vector), *shape)
-    return (found.reshape(len(found), -1, n) @ vector[:, :, None]).reshape(len(found), *shape)
+def _last(found: Array, vector: Array, number: int) -> Array:
+    """Contract the last axes, of a number, with a vector at every sample: one product of matrices."""
+    samples, n = vector.shape
+    shape, products = found.shape[1 : found.ndim - number], (factors := np.ascontiguousarray(vector.T))
+    for _ in range(number - 1):
+        products = (products[:, None] * factors).reshape(-1, samples)
+    if found.shape[0] == 1:  # the same tensor at all samples
+        return (products.T @ found.reshape(-1, n**number).T).reshape(samples, *shape)
+    return (found.reshape(samples, -1, n**number) @ products.T[:, :, None]).reshape(samples, *shape)
