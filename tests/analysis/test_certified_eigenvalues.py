@@ -400,3 +400,24 @@ def test_zeros_that_coincide_at_a_fraction_are_real(form):
     every = cra.certify_eigenvalues(column, 5, oscillating=False)
     assert every.complete and (every.lower[:2] == 0.0).all() and (every.lower[4:] == proof.lower[:1]).all()
     np.testing.assert_allclose(every.lower[2:4], -rate, rtol=1e-15)
+
+
+def test_the_bound_of_the_determinant_holds_on_circles():
+    """With spans, a mass, a damper and a support inside, a coordinate, and coefficients with the parameter below."""
+    q = sp.Function("q")(t)
+    made = model(
+        HALF * rho * v.diff(t) ** 2 - HALF * EI * (1 + sp.Heaviside(x - a)) * v.diff(x, 2) ** 2,
+        essential=[*CLAMPED, v.subs(x, L / 2)], coordinates=[q],
+        inside=[(a, HALF * m * v.diff(t) ** 2)], right=-HALF * k * (v - q) ** 2 + HALF * m * q.diff(t) ** 2,
+        virtual_work=[(-c * v.diff(t), v, a), (-tau * EI * v.diff(x, 2, t), v.diff(x, 2), "domain")],
+    )  # fmt: skip
+    system = bound(made)
+    values = {name: VALUES[name] for name in system.numerics("names")}
+    determinant = _characteristic(flint, bound_problem(flint, system.numerics, {}, values, damped=True)).determinant
+    with precision(flint, 128):
+        for radius in (1.0, 30.0, 700.0):
+            largest = determinant.bound(flint.arb(radius))
+            sizes = [abs(determinant.value(radius * flint.acb(share).exp_pi_i())) for share in np.linspace(0.0, 1.0, 9)]
+            assert all(size < largest for size in sizes)
+            assert largest < max(size.upper() for size in sizes) * flint.arb(10) ** 20  # and is of use
+        assert determinant.bound(flint.arb(1000.0)) is None  # 1 over the time of retardation

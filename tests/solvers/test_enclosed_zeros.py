@@ -116,3 +116,16 @@ def test_nothing_is_claimed_beyond_a_pole():
     assert Disc.of(flint, Pole(), 0.5, 0, False).number(flint.arb(0.9)) == 0
     with pytest.raises(UndecidedError, match="analytic"):
         Disc.of(flint, Pole(), 1.5, 0, False)
+
+
+def test_the_rest_bounds_what_the_polynomial_leaves_out():
+    """At places in the disc, with so many digits that the difference is not rounding."""
+    with precision(flint, 1024):
+        disc = Disc.of(flint, Cosine(), 6.0, 0, False)
+        polynomial = flint.acb_poly(disc.coefficients)
+        differences = []
+        for share in (flint.acb(1), flint.acb(0, 1), flint.acb(0.6, 0.8), flint.acb(-0.3, 0.2)):
+            difference = abs((share * 6).cos() - polynomial(share))
+            assert difference <= disc.rest
+            differences.append(difference)
+        assert any(difference > disc.rest * flint.arb(2) ** -100 for difference in differences)
