@@ -188,11 +188,13 @@ def test_series_of_periodic_systems(kind):
     """Three steps of few systems; what is common to all of them or not, and of low rank or not."""
     rng = np.random.default_rng(8)
     points, wave = 3, floquet.Oscillation(1, "cos", 0)
-    still, drag = np.diag([1.0, 3.0]), 0.1 * np.ones((2, 2)) if kind == "damper" else 0.1 * rng.normal(size=(2, 2))
+    still, drag = np.diag([1.0, 3.0]), 0.1 * rng.normal(size=(2, 2))
+    if kind in ("damper", "stiffness", "soft"):  # for the last two half a period gives the other
+        drag = 0.1 * np.ones((2, 2))
     some, others = (0.1 * rng.normal(size=(4, 2, 2)) for _ in range(2))
     drives = {
-        "stiffness": [(wave, (some[0], None, None, None))],
-        "soft": [(wave, (part, None, None, None)) for part in others[:2]],
+        "stiffness": [(wave, (some[0] + some[0].T, None, None, None))],
+        "soft": [(wave, (part + part.T, None, None, None)) for part in others[:2]],
         "damper": [(wave, (None, np.ones((2, 2)), None, None))],
         "mass": [(wave, (None, None, None, 0.2 * np.eye(2)))],
         "masses": [(wave, some), (floquet.Oscillation(2, "sin", 1), others)],
@@ -202,6 +204,7 @@ def test_series_of_periodic_systems(kind):
     }[kind]
     soft = [0.9, 0.2] if kind == "soft" else None
     system, _ = periodic.PeriodicSystem.of(still, drag, drives, np.linspace(2.0, 3.0, points), 0.3, soft)
+    assert (system.parity() is not None) == (kind in ("stiffness", "soft"))
     loop = plain("solvers/taylor_lanes", *growth._template_parts()).propagate
     one, two = (periodic.monodromy(system, 1e-3, found) for found in (loop, None))
     # the same series, but steps may end one coefficient earlier or later, which is within the tolerance
