@@ -23,7 +23,8 @@ from cra_sym.solvers.eigenvalue_enclosures import AmbiguousError, Characteristic
 
 __all__ = ["Certificate", "EigenvalueCertificate", "certify", "certify_eigenvalues"]
 
-_MORE = 8  # eigenvalues beyond those asked for, the nearest of which bounds the circle
+_ROUGH = 1e-4  # tolerance of guesses
+_MORE, _MOST = 8, 200  # eigenvalues beyond those asked for, the nearest of which bounds the circle; guesses at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,7 @@ def certify(system: System, modes: int = 3) -> Certificate:
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
     natural = system.conservative_part is system
-    guesses = np.asarray(1j * system.natural_frequencies(modes) if natural else eigenvalues(system, modes))
+    guesses = np.asarray(1j * system.natural_frequencies(modes)) if natural else _guesses(system, modes)
     ends, complete = _proved(system, guesses, damped=not natural)
     lower, upper = ends.imag
     return Certificate(lower, upper, complete)
@@ -169,12 +170,7 @@ def certify_eigenvalues(system: System, modes: int = 3, *, oscillating: bool = T
     instance("system", system, System)
     modes = count("modes", modes, high=MOST_MODES)
     instance("oscillating", oscillating, bool)
-    try:
-        guesses = eigenvalues(system, modes, oscillating=oscillating)
-    except (ValueError, ArithmeticError):
-        if oscillating:
-            raise
-        guesses = eigenvalues(system, modes)  # larger ones: their error alone may be small enough
+    guesses = _guesses(system, modes, oscillating)
     (lower, upper), complete = _proved(system, guesses, damped=True, oscillating=oscillating, unit=1.0)
     return EigenvalueCertificate(lower, upper, complete)
 
@@ -219,13 +215,30 @@ def _proved(
     return ends, complete
 
 
+def _guesses(system: System, modes: int, oscillating: bool = True) -> NDArray[np.complex128]:
+    """Return eigenvalues, of low accuracy if a higher one is not reached, or else those that oscillate."""
+    try:
+        return np.asarray(eigenvalues(system, modes, oscillating=oscillating))
+    except (ValueError, ArithmeticError):
+        rough = system.replace(tolerance=_ROUGH)
+        for kind in dict.fromkeys((oscillating, True)):
+            with suppress(ValueError, ArithmeticError):
+                return np.asarray(eigenvalues(rough, modes, oscillating=kind))
+        raise
+
+
 def _neighbours(system: System, guesses: NDArray[np.complex128]) -> NDArray[np.complex128]:
     """Return guesses of eigenvalues of both kinds, some more than given, if there are as many."""
     if system.numerics("conservative"):
         return guesses
+    near, number, largest = guesses, guesses.shape[-1] + _MORE, np.abs(guesses).max(axis=-1)
+    rough = system.replace(tolerance=_ROUGH)  # a copy, whose accuracy is its own
     with suppress(ValueError, ArithmeticError):
-        return np.asarray(eigenvalues(system, guesses.shape[-1] + _MORE, oscillating=False))
-    return guesses
+        near = np.asarray(eigenvalues(rough, number, oscillating=False))
+        while number < _MOST and not (np.abs(near).max(axis=-1) > largest).all():  # many real ones come first
+            number *= 2
+            near = np.asarray(eigenvalues(rough, number, oscillating=False))
+    return near
 
 
 def _by_count(flint: Any, problem: BoundProblem, guesses: NDArray[np.complex128]) -> list[Eigenvalue] | None:
