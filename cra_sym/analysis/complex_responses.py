@@ -169,8 +169,9 @@ class _Acting(NamedTuple):
 
     def moved(self, time: float) -> tuple[float, float]:
         """Return displacement and velocity."""
-        w, speed, _ = self.profile.kinematics(time)
-        return float(w[self.member]), float(speed[self.member])
+        alone = self.profile[self.member] if self.profile.shape else self.profile
+        w, speed, _ = alone.kinematics(time)
+        return float(w), float(speed)
 
 
 class _Member(NamedTuple):
