@@ -148,7 +148,7 @@ class Explorer:
             self.swing = changes.get("swing", self.swing)
             for name, view in self.views.items():
                 if view.reads & changes.keys():
-                    self._draw(name)
+                    self._redraw(name)
 
     def _check(self, values: dict[str, Any]) -> None:
         unknown = set(values) - set(self.values)
@@ -161,9 +161,19 @@ class Explorer:
         if "epsilon" in values and "epsilon" not in self._names:
             real_array("epsilon", values["epsilon"], low=0.0, high=1.0, open_low=True)
 
+    def _redraw(self, name: str) -> None:
+        """Draw a picture, or say why there is none, such as for a length that leaves a mass outside."""
+        try:
+            self._draw(name)
+        except (ValueError, ArithmeticError) as error:
+            self._show(name, self.views[name].figure.remark(str(error)))
+
     def _draw(self, name: str) -> None:
         view = self.views[name]
-        self._pictures[name] = view.figure.redraw(**view.arguments())
+        self._show(name, view.figure.redraw(**view.arguments()))
+
+    def _show(self, name: str, picture: bytes) -> None:
+        self._pictures[name] = picture
         if "images" in self.__dict__:
             self.images[name].value = self._pictures[name]
 

@@ -261,3 +261,22 @@ def test_coordinates_alone_are_explored(turning):
         shown = [ax.lines[-1].get_ydata() for ax in draw("mode_shapes", given).axes]
         exact = [given.modes(2).coordinate(place) for place in (0, 1)]
         np.testing.assert_array_equal(np.transpose(shown), exact)
+
+
+def test_values_without_a_system_are_said_in_the_picture():
+    """A slider that leaves a mass outside the span had raised in its callback and left the old pictures."""
+    pytest.importorskip("ipywidgets", reason="needs the extra explore: ipywidgets")
+    view = cra.explore(system("beam with an interior mass"))
+    view.picture()
+    place = view.sliders["l"]
+    good, bad = place.value, min(value for _, value in place.options)
+    view.sliders["a"].value = max(value for _, value in view.sliders["a"].options)
+    assert bad < view.values["a"] < good
+    place.value = bad
+    for one in view.views.values():
+        (text,) = (text.get_text() for text in one.figure.axes[0].texts)
+        assert "must be in the domain" in text.replace("\n", " ")
+    assert view.values["l"] == bad and pixels(view.picture()).std() > 0
+    place.value = good
+    view.sliders["a"].value = 0.5
+    assert drawn(view.views["response"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from io import BytesIO
+from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
 
 __all__ = ["LiveFigure"]
 
+_LINE = 60  # letters of a line
 _FILL = 0.6  # axis limits are kept while the data fill this share of them, so that a change is visible
 
 
@@ -63,6 +65,15 @@ class LiveFigure:
             self._draw(*given, axes=self.axes, **more)
             if self._frame is not None:
                 self._hold(limits)
+            self._paint()
+        return self._png()
+
+    def remark(self, words: str) -> bytes:
+        """Write words in place of what was there; return the picture as PNG."""
+        with styled():
+            self._wipe()
+            ax = self.axes[0]
+            ax.text(0.03, 0.5, fill(words, _LINE), transform=ax.transAxes, fontsize=8, color="0.25", va="center")
             self._paint()
         return self._png()
 
