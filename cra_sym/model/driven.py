@@ -117,7 +117,8 @@ def driven_displacement(model: Model, drive: Expr) -> int:
     order = [*left, *form.coordinates, *right]
     if not isinstance(drive, Expr) or drive not in order:
         known = ", ".join(map(str, (*model.driving, *order)))
-        raise ValueError(f"drive = {shown(drive)}: must be one of {known}, or a displacement at an interior place")
+        inside = ", or a displacement at an interior place" if form.displacements else ""
+        raise ValueError(f"drive = {shown(drive)}: must be one of {known}{inside}")
     place = order.index(drive)
     if form.free[place, :].is_zero_matrix:
         raise ValueError(f"drive = {drive}: an essential condition holds it still")
@@ -127,7 +128,7 @@ def driven_displacement(model: Model, drive: Expr) -> int:
 def pushed(model: Model, drive: Expr) -> tuple[Model, str, Kernel] | None:
     """Return the model with a force on a displacement at an interior place, the force's name and the place.
 
-    None if ``drive`` is not at an interior place.
+    None if ``drive`` is not at an interior place, or the model has coordinates alone.
 
     Raises
     ------
@@ -135,7 +136,7 @@ def pushed(model: Model, drive: Expr) -> tuple[Model, str, Kernel] | None:
         If the expression is not a displacement of a section.
     """
     local = at_place(drive, model.equations.x) if isinstance(drive, Expr) else None
-    if local is None or local[0] in model.equations.domain:
+    if local is None or local[0] in model.equations.domain or not model.state_form.displacements:
         return None
     place, displacement = local
     if displacement not in model.state_form.displacements:

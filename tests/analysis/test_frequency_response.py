@@ -186,3 +186,16 @@ def test_a_force_inside_beside_terms_that_oscillate():
     alone = place**2 * (3 - place) / 6 / 5.0  # a unit force on the cantilever moves its tip by that
     found = cra.frequency_response(system, 0.0, drive=v.subs(x, place))
     assert found == pytest.approx(alone / (1 + 30.0 / (3 * 5.0)), rel=1e-12)
+
+
+def test_coordinates_alone_have_no_places_to_drive():
+    """What a force may act on was an empty list."""
+    q, k, m = sp.Function("q")(t), *sp.symbols("k m")
+    block = cra.Model(
+        0, fields=[], x=x, domain=(0, L), t=t, coordinates=[q], left=m * q.diff(t) ** 2 / 2 - k * q**2 / 2
+    )
+    system = block.at({m: 1.0, k: 4.0, **({L: 1.0} if L in block.symbols else {})})
+    for drive in (v.subs(x, 0.1), sp.Function("y")(0.1, t), "z"):
+        with pytest.raises(ValueError, match=r"drive = .*: must be one of q\(t\)$"):
+            cra.frequency_response(system, 1.0, drive=drive)
+    assert cra.frequency_response(system, 1.0, drive=q) == pytest.approx(1 / 3, rel=1e-12)
