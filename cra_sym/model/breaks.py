@@ -123,6 +123,14 @@ class Breaks:
         alike = np.abs(place[:, :, None] - place[:, None, :]) <= 1e-12 * length[:, None, None]
         return place, rate / alike.sum(axis=-1)  # each jump once, also where two switches meet
 
+    def inside(self, columns: Array, left: Array, length: Array) -> Array:
+        """Return all breakpoints and interior places, (sets, places); those outside the domain are at its left end."""
+        found = [root for _, root in self._candidates(columns, left, length)]
+        found += [np.broadcast_to(place, left.shape)[:, None] for place in self.places.function(*columns)]
+        every = np.concatenate([left[:, None], *found], axis=1)
+        with np.errstate(invalid="ignore"):
+            return np.where((every > left[:, None]) & (every < (left + length)[:, None]), every, left[:, None])
+
     def _candidates(self, columns: Array, left: Array, length: Array) -> Iterator[tuple[int, Array]]:
         """Yield the number of each switch with its zeros, (sets, zeros), some of them outside or infinite."""
         arguments = columns[..., None]

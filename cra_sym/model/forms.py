@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from sympy import Expr, S, Symbol, cancel
 
 from cra_sym.kernels import Kernel, kernel
+from cra_sym.mechanics.breakpoints import switches
 from cra_sym.mechanics.jets import END_NAMES, Jet
 from cra_sym.mechanics.weak import Bilinear, WeakForm
+from cra_sym.model.breaks import breaks
+from cra_sym.model.cuts import Cuts
 from cra_sym.model.projection import BilinearForm, Displacement, Load
 
 __all__ = ["form_of", "load_of"]
@@ -39,6 +42,7 @@ def load_of(weak: WeakForm, inside: Mapping[Jet, Expr], ends: Mapping[Jet, Expr]
         rest,
         tuple(_place(weak, jet) for jet in others),
         places=_places(weak, symbols),
+        cuts=_cuts(weak, inside.values(), symbols),
     )
 
 
@@ -69,7 +73,21 @@ def form_of(weak: WeakForm, named: Mapping[str, tuple[Bilinear, Bilinear]], symb
         kernel(values[1], symbols, backend="numpy"),
         not any(value.has(x) for value in values[0]),
         places=_places(weak, symbols),
+        cuts=_cuts(weak, values[0], symbols),
     )
+
+
+def _cuts(weak: WeakForm, densities: Iterable[Expr], symbols: Symbols) -> Cuts | None:
+    """Return where densities are not smooth along the domain, or None."""
+    x = weak.variation.space.x
+    entries = [(power, value) for entry in weak.inside.values() for power, value in entry.items() if value.has(x)]
+    given, own = [value for value in densities if value.has(x)], [value for power, value in entries if power != 1]
+    found = {*switches(given, x)}
+    if not found:
+        return None
+    every = [*given, *(value for _, value in entries)]
+    places = tuple(point.place for point in weak.points)
+    return Cuts(breaks(every, x, symbols, places), bool(found - {*switches(own, x)}))
 
 
 def _places(weak: WeakForm, symbols: Symbols) -> Kernel | None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from cra_sym.cached import cached_property
 from cra_sym.kernels import Kernel, kernel
+from cra_sym.model.cuts import Cuts
 from cra_sym.model.moving import Jumps
 from cra_sym.model.routes import Modes, RigidShare, Stations
 
@@ -72,6 +73,8 @@ class Load:
         Forces on both ends that remain besides that part.
     places : Kernel or None
         Of the parameters: interior places, if there are any.
+    cuts : Cuts or None
+        Where the density is not smooth, if it is not.
     """
 
     inside: tuple[Displacement, ...]
@@ -83,6 +86,7 @@ class Load:
     rest: Kernel | None = None
     rest_ends: tuple[Displacement, ...] = ()
     places: Kernel | None = None
+    cuts: Cuts | None = None
 
     @classmethod
     def unit(cls, place: Displacement, at: float, symbols: Sequence[Any]) -> Load:
@@ -110,6 +114,8 @@ class BilinearForm:
         and '<parameter> stiffness' and '<parameter> mass' in the order of the parameters.
     places : Kernel or None
         Of the parameters: interior places, if there are any.
+    cuts : Cuts or None
+        As of a `Load`.
     """
 
     names: tuple[str, ...]
@@ -120,6 +126,7 @@ class BilinearForm:
     uniform: bool
     jumps: Jumps | None = None
     places: Kernel | None = None
+    cuts: Cuts | None = None
 
 
 class EndParameter(NamedTuple):
@@ -159,11 +166,13 @@ def column(value: float | Array, axes: int = 1) -> float | Array:
     return value[(..., *(None,) * axes)] if isinstance(value, np.ndarray) and value.ndim else value
 
 
-def stations(domain: Domain, modes: Modes) -> tuple[Array, Array]:
+def stations(domain: Domain, modes: Modes, cuts: Cuts | None = None) -> tuple[Array, Array]:
     """Return points and weights of a quadrature along the domain, shape (points,) or (..., points)."""
+    panels = modes.omega.shape[-1] + 8  # ten points each: several to a half-wave of the highest mode
+    if cuts is not None and (cuts.elsewhere or not isinstance(modes, Stations)):
+        return cuts.stations(domain.values, domain.left, domain.length, modes.omega.shape[:-1], 2 * panels)
     if isinstance(modes, Stations):
         return modes.stations()
-    panels = modes.omega.shape[-1] + 8  # ten points each: several to a half-wave of the highest mode
     share = ((np.arange(panels)[:, None] + 0.5 * (1.0 + _POINTS)) / panels).ravel()
     length = column(domain.length)
     return np.asarray(column(domain.left) + share * length), np.tile(0.5 * _WEIGHTS / panels, panels) * length
@@ -221,7 +230,7 @@ def project(domain: Domain, modes: Modes, load: Load) -> Array:
     total = _add_ends(total, domain, modes, load, load.ends, load.force.function(*domain.values))
     if not load.inside:
         return total
-    x, weights = stations(domain, modes)
+    x, weights = stations(domain, modes, load.cuts)
     density = load.density.function(x, *map(column, domain.values))
     for place, factor in zip(load.inside, density, strict=True):
         total = total + ((factor * weights)[..., None, :] * along(modes, place, x)).sum(axis=-1)
@@ -326,7 +335,7 @@ class Projected:
 
     @cached_property
     def _stations(self) -> tuple[Array, Array]:
-        return stations(self._domain, self._modes)
+        return stations(self._domain, self._modes, self._form.cuts)
 
     @cached_property
     def _ends(self) -> list[Array]:

@@ -8,6 +8,7 @@ import sympy as sp
 from scipy.signal import lsim
 
 import cra_sym as cra
+from cra_sym.model.modal_matrices import modal_matrices
 from cra_sym.symbols import symbol
 
 x, t = sp.symbols("x t")
@@ -180,3 +181,30 @@ def test_axes_follow_the_arguments():
     assert model.response(VALUES, {F: cra.Force(1.0)}, TIMES, 0.5).shape == (301,)
     assert model.response(VALUES, {F: cra.Force(1.0)}, 0.3, [0.5]).shape == (1,)
     assert np.shape(model.tip_response(VALUES, {F: cra.Force(1.0)}, 0.3)) == ()
+
+
+def test_loads_dampers_and_excitations_of_a_part_of_a_uniform_span():
+    """Integrals along the span went across the ends of that part: percents of the force on a mode were wrong."""
+    x, t, EI, m, a, c, k, epsilon, varpi = sp.symbols("x t EI m a c k epsilon varpi")
+    v, F = sp.Function("v")(x, t), sp.Function("F")(t)
+    part = sp.Piecewise((1, x < a), (0, True))
+    pulsating = k * epsilon * sp.cos(varpi * t) * part * v**2 / 2
+    model = cra.Model(
+        m * v.diff(t) ** 2 / 2 - EI * v.diff(x, 2) ** 2 / 2 + F * part * v - pulsating, fields=[v], x=x, domain=(0, 1),
+        t=t, essential=[v.subs(x, 0), v.subs(x, 1)], small=(epsilon, varpi),
+        virtual_work=[(-c * part * v.diff(t), v, "domain")],
+    )  # fmt: skip
+    place = np.array([0.37, 0.5])
+    system = model.at({EI: 1.0, m: 1.0, c: 0.7, k: 3.0, a: place})
+    number = np.arange(1, 5)
+    # sqrt(2) sin(n pi x), of which the sign is that of the modes
+    sign = np.sign(cra.mode_shapes(system, 0.99, 4)[0] * np.sin(number * np.pi * 0.99))
+    force = sign * np.sqrt(2) * (1 - np.cos(number * np.pi * place[:, None])) / (number * np.pi)
+    np.testing.assert_allclose(system.project(system.numerics("load", "F"), 4), force, rtol=0, atol=1e-13)
+    i, j, at = number[:, None], number, place[:, None, None]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        overlap = np.sin((i - j) * np.pi * at) / ((i - j) * np.pi) - np.sin((i + j) * np.pi * at) / ((i + j) * np.pi)
+    overlap = np.where(i == j, at - np.sin(2 * i * np.pi * at) / (2 * i * np.pi), overlap) * np.outer(sign, sign)
+    (drive,) = model.excitation.drives(system, 4)
+    np.testing.assert_allclose(drive.stiffness, 3.0 * overlap, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(modal_matrices(system, 4).damping, 0.7 * overlap, rtol=0, atol=1e-12)
