@@ -13,6 +13,7 @@ __all__ = [
     "exponents_of",
     "flat",
     "growth_of",
+    "multipliers_of",
     "paired_exponents",
     "rate_of",
     "whole_period",
@@ -104,12 +105,32 @@ def growth_of(growing: np.ndarray) -> np.ndarray:
     return np.asarray(np.maximum(growing.real.max(axis=-1), 0.0))
 
 
-def exponents_of(maps: np.ndarray, period: np.ndarray) -> np.ndarray:
-    """Return the exponents of monodromy matrices (points, 2N, 2N), largest real part first.
+def multipliers_of(maps: np.ndarray, error: float | None = None) -> np.ndarray:
+    r"""Return the multipliers of monodromy matrices, complex, shape (points, 2N).
+
+    With an error of the maps, relative to their size: those of systems of whose multipliers :math:`\mu` also
+    :math:`1/\bar\mu` is one, as without damping. One that has no such partner, or that the error may have moved off the
+    unit circle, is on it.
+    """
+    found = np.linalg.eigvals(maps).astype(complex)
+    if error is None:
+        return found
+    numbers, size = np.arange(found.shape[-1]), np.linalg.norm(maps, axis=(1, 2))[:, None]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        partners = 1.0 / found.conj()
+        own, apart = np.abs(found - partners), np.abs(partners[:, :, None] - found[:, None, :])
+        apart[:, numbers, numbers] = np.inf
+        # the error of two multipliers this near to each other grows by the inverse of their distance
+        still = (own <= apart.min(axis=-1)) | (own**2 <= error * size)
+        return np.asarray(np.where(still, found / np.abs(found), found))
+
+
+def exponents_of(multipliers: np.ndarray, period: np.ndarray) -> np.ndarray:
+    """Return the exponents of multipliers, shape (points, 2N), largest real part first.
 
     Their imaginary parts are fixed up to multiples of the excitation frequency and given between -1/2 and 1/2 of it.
     """
-    return _ordered(np.log(np.linalg.eigvals(maps).astype(complex)) / period[:, None], period)
+    return _ordered(np.log(multipliers) / period[:, None], period)
 
 
 def _ordered(exponents: np.ndarray, period: np.ndarray) -> np.ndarray:
@@ -117,8 +138,8 @@ def _ordered(exponents: np.ndarray, period: np.ndarray) -> np.ndarray:
     return np.take_along_axis(exponents, order, axis=-1)
 
 
-def rate_of(maps: np.ndarray, period: np.ndarray, *, damped: bool) -> np.ndarray:
-    """Return max(0, largest real part of the exponents) of monodromy matrices (points, 2N, 2N).
+def rate_of(maps: np.ndarray, period: np.ndarray, *, damped: bool, error: float | None = None) -> np.ndarray:
+    """Return max(0, largest real part of the exponents) of monodromy matrices; ``error`` as of :func:`multipliers_of`.
 
     Damped systems most of whose points are stable are decided by powers: where the norm of one is below 1, so are all
     multipliers. Eigenvalues cost fifty times as much as a square.
@@ -130,6 +151,7 @@ def rate_of(maps: np.ndarray, period: np.ndarray, *, damped: bool) -> np.ndarray
             undecided = ~(np.einsum("pij,pij->p", power, power) < 0.25)  # far from 1, for the rounding
         if not undecided.all():
             left, power = left[undecided], power[undecided]
-    multipliers = np.abs(np.linalg.eigvals(maps[left])).max(axis=-1)
-    rates[left] = np.maximum(np.log(multipliers) / period[left], 0.0)
+    growth = np.log(np.abs(multipliers_of(maps[left], error))).max(axis=-1)
+    rates[left] = np.maximum(growth / period[left], 0.0)
+    rates[rates * period <= 4 * np.finfo(float).eps] = 0.0  # rounding of a multiplier on the unit circle
     return rates

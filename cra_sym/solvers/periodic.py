@@ -21,6 +21,7 @@ from cra_sym.solvers.floquet import (
     both_of_pairs,
     exponents_of,
     growth_of,
+    multipliers_of,
     paired_exponents,
     rate_of,
     whole_period,
@@ -40,6 +41,7 @@ __all__ = [
 Array = NDArray[np.float64]
 _HIGHEST = 24
 """Order of the series, at most."""
+_SHARP, _DOUBT = 1e-13, 10.0  # tolerance where multipliers come in pairs; error of the maps, over the tolerance
 _WIDEST = 3.0  # largest step, in units of the fastest motion's time; beyond it the terms of the series lose digits
 _PRODUCTS = 31  # cost of the matrix products of one term, in units of half a term of a product of series
 _SWUNG = 4  # weight of what oscillates against the angle in a period, in the choice of systems that are alike
@@ -195,27 +197,41 @@ def _cheapest(series: Array, tolerance: float) -> tuple[int, int]:
     return int(steps[best]), int(orders[best])
 
 
-def _pairs(system: PeriodicSystem, tolerance: float, loop: Loop | None) -> tuple[Array | None, Array]:
-    """Return one exponent of each pair of exponents where they come in pairs, else None, and the monodromy matrices."""
+class _Growth(NamedTuple):
+    """What exponents follow from: one of each pair, or the monodromy matrices, and their error if there are pairs."""
+
+    pairs: Array | None
+    maps: Array
+    error: float | None
+
+
+def _growth(system: PeriodicSystem, tolerance: float, loop: Loop | None) -> _Growth:
+    symmetric = system.conservative or system.reversible
+    if symmetric and not (system.conservative and system.parity() is not None):
+        tolerance = min(tolerance, _SHARP)
+        return _Growth(None, _maps(system, tolerance, loop).whole(), _DOUBT * tolerance)
     found = _maps(system, tolerance, loop)
-    if found.parity is None or not system.conservative:
-        return None, found.whole()
-    return paired_exponents(found.canonical(), system.period), found.maps
+    if not symmetric:
+        return _Growth(None, found.whole(), None)
+    return _Growth(paired_exponents(found.canonical(), system.period), found.maps, None)
 
 
 def growth_rate(*given: Any, tolerance: float = 1e-10, loop: Loop | None = None) -> Array:
     """Return max(0, largest real part of the exponents), shape (...); arguments of :meth:`PeriodicSystem.of`."""
     system, shape = PeriodicSystem.of(*given)
-    growing, maps = _pairs(system, tolerance, loop)
-    if growing is not None:
-        return growth_of(growing).reshape(shape)
-    rates = rate_of(maps, system.period, damped=bool(np.einsum("iip->p", system.damping).any()))
-    return rates.reshape(shape)
+    pairs, maps, error = _growth(system, tolerance, loop)
+    if pairs is not None:
+        return growth_of(pairs).reshape(shape)
+    damped = error is None and bool(np.einsum("iip->p", system.damping).any())
+    return rate_of(maps, system.period, damped=damped, error=error).reshape(shape)
 
 
 def floquet_exponents(*given: Any, tolerance: float = 1e-10, loop: Loop | None = None) -> NDArray[np.complex128]:
     """Return all Floquet exponents, shape (..., 2N), largest real part first; arguments as :func:`growth_rate`."""
     system, shape = PeriodicSystem.of(*given)
-    growing, maps = _pairs(system, tolerance, loop)
-    exponents = exponents_of(maps, system.period) if growing is None else both_of_pairs(growing, system.period)
+    pairs, maps, error = _growth(system, tolerance, loop)
+    if pairs is None:
+        exponents = exponents_of(multipliers_of(maps, error), system.period)
+    else:
+        exponents = both_of_pairs(pairs, system.period)
     return exponents.reshape(*shape, exponents.shape[-1])

@@ -207,6 +207,12 @@ class PeriodicSystem:
                 pairs.append((s.damping, s.momentum, -1))
         return all(bool((matrix == sign * other.swapaxes(0, 1)).all()) for matrix, other, sign in pairs)
 
+    @property
+    def reversible(self) -> bool:
+        """Whether the motions backwards in time are motions: nothing depends on velocities, and all waves are even."""
+        only = all(s.damping is None and s.momentum is None and s.oscillation.kind == "cos" for s in self.swings)
+        return only and not self.damping.any()
+
     def in_axes_of_mass(self, parity: NDArray[np.int8] | None = None) -> tuple[PeriodicSystem, Array | None]:
         """Return the system in axes that make all oscillating masses diagonal, and these axes, or None.
 

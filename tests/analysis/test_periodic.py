@@ -816,3 +816,33 @@ def test_an_input_in_oscillating_terms_alone_drives():
         ValueError, match=r"small: the load .*push\(t\)\*\*2.* must be linear in prescribed motions and"
     ):
         block.model.replace(left=energy + epsilon * cos(varpi * t) * q * push**2)
+
+
+@pytest.mark.parametrize("kind", ["phases", "gyroscopic", "equal", "free", "circulatory"])
+def test_what_does_not_grow_without_damping_does_so_by_nothing(kind):
+    """Where half a period does not give the other: several phases, equal planes, rigid motions, follower forces."""
+    rng = np.random.default_rng(4)
+    cosine, sine = (floquet.Oscillation(1, wave, 0) for wave in ("cos", "sin"))
+    still, drag, (swung, other, turn) = np.diag([1.0, 4.0, 9.0]), np.zeros((3, 3)), rng.normal(size=(3, 3, 3))
+    swung, other, turn = swung + swung.T, other + other.T, turn - turn.T
+    drives = [(cosine, (swung, None, None, None)), (sine, (other, None, None, None))]
+    if kind == "gyroscopic":
+        drag, drives = turn, drives[:1]
+    elif kind == "equal":  # every multiplier is double
+        still, drag = np.kron(still[:2, :2], np.eye(2)), np.zeros((4, 4))
+        drives = [(wave, (np.kron(m[0][:2, :2], np.eye(2)), None, None, None)) for wave, m in drives]
+    elif kind == "free":
+        still = np.diag([0.0, 4.0, 9.0])
+        drives = [(wave, (None, None, None, m[0] / 12)) for wave, m in drives]
+    elif kind == "circulatory":
+        still, drives = still + 0.3 * np.triu(other, 1), [(cosine, (swung + 0.3 * turn, None, None, None))]
+    varpi, size = np.linspace(0.5, 8.0, 24), np.linspace(0.0, 0.4, 9)[:, None]
+    growth = periodic.growth_rate(still, drag, drives, varpi, size) * 2 * np.pi / varpi
+    system, shape = periodic.PeriodicSystem.of(still, drag, drives, varpi, size)
+    multipliers = np.linalg.eigvals(periodic.monodromy(system, 1e-14))
+    exact = np.log(np.abs(multipliers).max(axis=-1)).reshape(shape)
+    growing = exact > 1e-5  # rigid motions' double multipliers are known to half the digits
+    assert ((growth > 0) == growing).all() and growing.any() and not growing.all()
+    np.testing.assert_allclose(growth[growing], exact[growing], rtol=1e-6)
+    exponents = periodic.floquet_exponents(still, drag, drives, varpi, size)
+    np.testing.assert_allclose(exponents[..., 0].real * 2 * np.pi / varpi, growth, rtol=1e-9, atol=1e-15)
