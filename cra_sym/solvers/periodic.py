@@ -96,8 +96,20 @@ def _maps(system: PeriodicSystem, tolerance: float, loop: Loop | None) -> _Maps:
             out[block] = operations.maps(block, rate[block], steps, order, tolerance, half=half, loop=loop)
             continue
         states = propagated(system.take(block), steps, order, half=half, tolerance=tolerance, factored=True)
-        out[block] = np.moveaxis(deque(states, maxlen=1)[0], -1, 0)
-    return _Maps(system, axes, parity, out)
+        with np.errstate(over="ignore", invalid="ignore"):
+            out[block] = np.moveaxis(deque(states, maxlen=1)[0], -1, 0)
+    return _Maps(system, axes, parity, _finite(out, half=half))
+
+
+def _finite(maps: Array, *, half: bool = False) -> Array:
+    """Return the maps, or raise an error if some motions overflow; from half of a period their squares are needed."""
+    largest = np.finfo(float).max
+    if not (np.abs(maps) < (np.sqrt(largest) / maps.shape[-1] if half else largest)).all():
+        raise ValueError(
+            "epsilon: some motions grow beyond 1e308 within a period of the excitation; must be smaller, or "
+            "angular_frequency higher"
+        )
+    return maps
 
 
 def _alike(index: NDArray[np.intp], measures: Array, most: int) -> list[NDArray[np.intp]]:

@@ -130,7 +130,7 @@ class _Series:
             np.multiply(resistance, -fraction, out=u)
             end += z
             if self.tolerance and k + 4 >= self.known:
-                with np.errstate(all="ignore"):  # what overflows takes all terms
+                with np.errstate(all="ignore"):
                     sizes.append(np.sqrt((self._columns(z) / start).max()))
                 if self._is_last(sizes):
                     break
@@ -140,9 +140,10 @@ class _Series:
     def _columns(self, z: Array) -> Array:
         """Return the squares of the columns' norms, displacements in units of momenta, shape (2N, points)."""
         size = len(self.system.stiffness)
-        q, p = (np.einsum("ijp,ijp->jp", part, part) for part in (z[:size], z[size:]))
-        q *= self.rate**2
-        q += p
+        with np.errstate(all="ignore"):  # what overflows takes all terms
+            q, p = (np.einsum("ijp,ijp->jp", part, part) for part in (z[:size], z[size:]))
+            q *= self.rate**2
+            q += p
         return np.asarray(q)
 
     def _is_last(self, sizes: Sequence[float]) -> bool:

@@ -282,7 +282,7 @@ AXIS = "must be a number or one axis of"
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda m: m.mode_shapes(VALUES, [[0.1, 0.2]]), rf"x has shape \(1, 2\): {AXIS} points"),
+        (lambda m: m.mode_shapes(VALUES, [[0.1, 0.2]]), rf"x has shape \(1, 2\): {AXIS} places"),
         (
             lambda m: m.frequency_response(VALUES, [[1.0]], 0.5, drive=v.subs(x, L)),
             rf"frequency has shape .*: {AXIS} freq",

@@ -213,3 +213,11 @@ def test_many_exponents_leave_narrow_gaps():
 def test_too_few_harmonics_are_refused():
     with pytest.raises(ValueError, match="harmonics"):
         hill_exponents([1.0, 30.0], np.eye(2), 0.9, 0.1, harmonics=3)
+
+
+@pytest.mark.parametrize("decay", [0.0, 0.1])
+@pytest.mark.parametrize("epsilon", [1e6, 1e7])
+def test_motions_beyond_all_numbers_are_refused(epsilon, decay):
+    """The larger one in half a period already."""
+    with pytest.raises(ValueError, match="epsilon: some motions grow beyond 1e308"):
+        growth_of([1.0], [[[1.0]]], 3.0, epsilon, decay)
