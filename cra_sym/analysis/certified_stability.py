@@ -30,8 +30,9 @@ def certify_stability(
     The proof is for the model of that many modes, that is for the equations of motion between them, with every
     coefficient within `system.accuracy` of the computed one, 1e-11 at least, relative to the sum of its row. 'stable'
     means that every motion is bounded: all multipliers lie inside the unit circle, or, without any damping, on it and
-    apart from each other. 'unstable' means that a multiplier lies outside. On a boundary, and where multipliers meet, a
-    point is 'undecided'. The method is in :mod:`cra_sym.solvers.proved_stability`: enclosures of the monodromy matrix
+    apart from each other; a system that moves as a rigid body is therefore not stable. 'unstable' means that a
+    multiplier lies outside. On a boundary, and where multipliers meet, a point is 'undecided'. The method is in
+    :mod:`cra_sym.solvers.proved_stability`: enclosures of the monodromy matrix
     by Taylor series with bounds of the truncation and rounding errors, and of its multipliers by discs.
 
     Parameters
@@ -73,7 +74,7 @@ def certify_stability(
     slowest = np.where(omega > 0, omega, np.maximum(omega.max(axis=-1, keepdims=True), 1.0) * 1e-2)
     unit = slowest.reshape(-1, 1) if slowest.size == modes else flat(slowest, shape, 1)
     spread = float(np.fmax(system.basis.accuracy, ROUNDING).max())
-    verdict = proved_stability(batch, unit, _conservative(matrices), spread)
+    verdict = proved_stability(batch, unit, _conservative(matrices) or batch.reversible, spread)
     words = np.where(verdict == STABLE, "stable", np.where(verdict == UNSTABLE, "unstable", "undecided"))
     return words.reshape(shape)[()]
 

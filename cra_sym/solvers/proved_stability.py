@@ -91,7 +91,7 @@ class _Bounds:
         return np.where(inside, self.light / np.where(inside, 1.0 - _ENLARGED * share, 1.0), np.inf)
 
 
-def proved_stability(system: PeriodicSystem, unit: Array, conservative: bool, spread: float) -> NDArray[np.int8]:
+def proved_stability(system: PeriodicSystem, unit: Array, paired: bool, spread: float) -> NDArray[np.int8]:
     """Return STABLE, UNSTABLE or UNDECIDED for every system.
 
     Parameters
@@ -100,8 +100,9 @@ def proved_stability(system: PeriodicSystem, unit: Array, conservative: bool, sp
         Stiffness, damping and mass may oscillate; momenta may not.
     unit : ndarray, shape (N, points) or (N, 1)
         Factors of q in modal units, rad/s: the natural frequencies where they are positive.
-    conservative : bool
-        Whether all systems are without damping: symmetric stiffness, skew damping matrices.
+    paired : bool
+        Whether with every multiplier also the inverse of its conjugate is one: the systems are conservative (symmetric
+        stiffness, skew damping matrices) or reversible.
     spread : float
         Relative uncertainty of the coefficients, against the sum of a row: the proof holds for all systems within it.
 
@@ -121,7 +122,7 @@ def proved_stability(system: PeriodicSystem, unit: Array, conservative: bool, sp
         units = unit if unit.shape[-1] == 1 else unit[:, block]
         with np.errstate(all="ignore"):
             maps, error = enclosed_monodromy(some, units, int(steps[block[-1]]), spread)
-            verdict[block] = _decided(*multiplier_discs(maps, error), conservative)
+            verdict[block] = _decided(*multiplier_discs(maps, error), paired)
     return verdict
 
 
@@ -290,7 +291,7 @@ def _inverse(matrices: NDArray[Any]) -> NDArray[Any]:
         return np.linalg.pinv(matrices)
 
 
-def _decided(centres: NDArray[np.complex128], radii: Array, conservative: bool) -> NDArray[np.int8]:
+def _decided(centres: NDArray[np.complex128], radii: Array, paired: bool) -> NDArray[np.int8]:
     size = centres.shape[1]
     modulus, own = np.abs(centres), np.eye(size, dtype=bool)
     distance = np.abs(centres[:, :, None] - centres[:, None, :])
@@ -300,7 +301,7 @@ def _decided(centres: NDArray[np.complex128], radii: Array, conservative: bool) 
     outside = modulus - radii > 1.0
     unstable = (outside & ~(meet & ~outside[:, None, :]).any(axis=2)).any(axis=1)
     stable = (modulus + radii < 1.0).all(axis=1)
-    if conservative:
+    if paired:
         inner = modulus * (modulus - radii)
         image = (
             np.where(inner > 0, radii / np.where(inner > 0, inner, 1.0), np.inf) + np.abs(1.0 - modulus**2) / modulus

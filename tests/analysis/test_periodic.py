@@ -846,3 +846,18 @@ def test_what_does_not_grow_without_damping_does_so_by_nothing(kind):
     np.testing.assert_allclose(growth[growing], exact[growing], rtol=1e-6)
     exponents = periodic.floquet_exponents(still, drag, drives, varpi, size)
     np.testing.assert_allclose(exponents[..., 0].real * 2 * np.pi / varpi, growth, rtol=1e-9, atol=1e-15)
+
+
+def test_follower_forces_without_damping_are_proved():
+    """Reversible in time: multipliers on the circle that stay apart prove that nothing grows."""
+    still = np.array([[1.0, 0.3, 0.0], [-0.2, 4.0, 0.5], [0.2, 0.1, 9.0]])
+    swung = np.array([[0.5, -0.4, 0.2], [0.9, 0.7, 0.3], [-0.1, 0.6, -0.8]])
+    drives = [(floquet.Oscillation(1, "cos", 0), (swung, None, None, None))]
+    varpi, size = np.linspace(0.7, 8.0, 40), np.linspace(0.0, 0.6, 12)[:, None]
+    system, shape = periodic.PeriodicSystem.of(still, np.zeros((3, 3)), drives, varpi, size)
+    assert system.reversible and not system.conservative
+    verdict = proved_stability.proved_stability(system, np.array([[1.0], [2.0], [3.0]]), system.reversible, 1e-11)
+    growth = periodic.growth_rate(still, np.zeros((3, 3)), drives, varpi, size)
+    stable, unstable = (verdict.reshape(shape) == word for word in (proved_stability.STABLE, proved_stability.UNSTABLE))
+    assert (growth[stable] == 0).all() and (growth[unstable] > 0).all() and unstable.any()
+    assert (stable | unstable).mean() > 0.97  # multipliers meet where frequencies differ by the excitation's
