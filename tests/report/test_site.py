@@ -304,6 +304,7 @@ def test_chapters_are_turned_and_numbers_followed(site, browser):
     assert Path(urlsplit(page.url).path).stem == "04_modes"
     page.click("a.prev-page")
     page.click('article a[href="../equations.html#eq-14"] >> nth=0')
+    page.wait_for_selector("#eq-14", state="attached")  # the address changes before the page is there
     assert page.url.endswith("equations.html#eq-14") and page.locator("#eq-14").count() == 1
     page.close()
 
