@@ -18,10 +18,16 @@ from cra_sym.model.vanishing import check_forces
 from cra_sym.solvers.lowest_motions import BasisModes, LowestMotions, lowest_motions
 from cra_sym.solvers.pencil import GeneralContinuum
 
-__all__ = ["of_complex_modes", "resonant_growth", "shapes_and_tests"]
+__all__ = ["check_complex_modes", "of_complex_modes", "resonant_growth", "shapes_and_tests"]
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+
+
+def check_complex_modes(system: System) -> None:
+    """Raise an error if complex modes cannot be computed."""
+    if system.numerics("pencil") is None:
+        raise ValueError("system: with a field that has no derivative by x there are no complex modes; eliminate it")
 
 
 def of_complex_modes(system: System, s: Complex, quantity: Callable[[System, Any], NDArray[Any]]) -> Complex:

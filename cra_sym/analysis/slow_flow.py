@@ -10,6 +10,7 @@ import numpy as np
 
 from cra_sym import checks
 from cra_sym.analysis.complex_flow import complex_flow
+from cra_sym.analysis.complex_shapes import check_complex_modes
 from cra_sym.analysis.nonlinear import MOST_NONLINEAR_MODES, nonlinear_modal_equations
 from cra_sym.model.system import System
 
@@ -162,8 +163,7 @@ def _of_complex_modes(flow: SlowFlow, found: Sequence[Symbol], system: System, m
         )
     if np.any(system.zeta):
         raise ValueError("zeta: must be 0 where modes are complex, which dampers of the model damp")
-    if system.numerics("pencil") is None:
-        raise ValueError("system: with a field that has no derivative by x there are no complex modes; eliminate it")
+    check_complex_modes(system)
     s, forces = complex_flow(system, modes)
     values: dict[Symbol, float] = {}
     for symbol in found:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from cra_sym import checks
-from cra_sym.analysis.complex_shapes import resonant_growth
+from cra_sym.analysis.complex_shapes import check_complex_modes, resonant_growth
 from cra_sym.analysis.eigenvalue_rates import gaps, with_next
 from cra_sym.analysis.floquet import batch_shape, matrices_of, parametric
 from cra_sym.analysis.modes import displaced, only_motion, participation
@@ -226,8 +226,7 @@ def forced_width(system: System, excitation: TransverseBase, modes: int = 3) -> 
 
 def _complex_growth(system: System, motion: str, modes: int) -> np.ndarray:
     """Return how fast the tip grows in resonance with a motion of unit amplitude, 1/s, shape (..., modes)."""
-    if system.numerics("pencil") is None:
-        raise ValueError("system: with a field that has no derivative by x there are no complex modes; eliminate it")
+    check_complex_modes(system)
     s = with_next(system, modes)
     apart, s = gaps(s)[..., :modes], s[..., :modes]
     decays = f"decays by more than {_LIGHT:g} of its frequency, so that its resonance does not grow"
