@@ -113,7 +113,7 @@ def certify(system: System, modes: int = 3) -> Certificate:
     modes = count("modes", modes, high=MOST_MODES)
     natural = system.conservative_part is system
     guesses = np.asarray(1j * system.natural_frequencies(modes)) if natural else _guesses(system, modes)
-    ends, complete = _proved(system, guesses, damped=not natural)
+    ends, complete = _proved(system, guesses, damped=not natural, hertz=True)
     lower, upper = ends.imag
     return Certificate(lower, upper, complete)
 
@@ -171,14 +171,14 @@ def certify_eigenvalues(system: System, modes: int = 3, *, oscillating: bool = T
     modes = count("modes", modes, high=MOST_MODES)
     instance("oscillating", oscillating, bool)
     guesses = _guesses(system, modes, oscillating)
-    (lower, upper), complete = _proved(system, guesses, damped=True, oscillating=oscillating, unit=1.0)
+    (lower, upper), complete = _proved(system, guesses, damped=True, oscillating=oscillating)
     return EigenvalueCertificate(lower, upper, complete)
 
 
 def _proved(
-    system: System, guesses: NDArray[np.complex128], *, damped: bool, oscillating: bool = True, unit: float = 0.0
+    system: System, guesses: NDArray[np.complex128], *, damped: bool, oscillating: bool = True, hertz: bool = False
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
-    """Return proved lower and upper ends of eigenvalues, in the unit or in Hz, and whether the set is complete.
+    """Return proved lower and upper ends of eigenvalues, in rad/s or in Hz, and whether the set is complete.
 
     Parameters
     ----------
@@ -187,8 +187,8 @@ def _proved(
     damped : bool
         Whether dampers are part of the problem.
     oscillating : bool
-    unit : float
-        In rad/s; 0 for 2 pi.
+    hertz : bool
+        Whether they are over 2 pi.
     """
     flint, modes = require("flint", "certify"), guesses.shape[-1]
     held, names = system.numerics("stiffnesses"), system.numerics("names")
@@ -206,7 +206,7 @@ def _proved(
             continue
         assert len(found) == modes
         with precision(flint, 128):
-            scale = flint.arb(unit) if unit else 2 * flint.arb.pi()
+            scale = 2 * flint.arb.pi() if hertz else flint.arb(1)
             for side, towards in enumerate((-np.inf, np.inf)):
                 ends[side][index] = [
                     complex(outward(one.real / scale, towards), outward(one.imag / scale, towards)) for one in found

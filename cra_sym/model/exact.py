@@ -88,10 +88,9 @@ def irrational_nodes(expression: Expr) -> set[Expr]:
 
 def exact_kernel(expressions: Sequence[Expr], symbols: Sequence[Symbol]) -> ExactKernel:
     """Return a kernel of expressions, with every number that is not a small integer as an argument."""
-    from sympy import Dummy, Float, Integer, Rational, fraction, together
+    from sympy import Dummy, Integer, fraction, together
 
-    # a Float of binary digits equals a fraction exactly
-    given = [e.xreplace({atom: Rational(atom) for atom in e.atoms(Float)}) for e in expressions]
+    given = list(map(_with_fractions, expressions))
     nodes = sorted(set().union(*map(irrational_nodes, given)), key=str)
     marks = {node: Dummy(f"irrational_{k}") for k, node in enumerate(nodes)}
     parts: dict[Expr, int] = {}
@@ -106,6 +105,13 @@ def exact_kernel(expressions: Sequence[Expr], symbols: Sequence[Symbol]) -> Exac
     digests = (hashlib.sha256(str(node).encode()).digest() for node in nodes)
     instead = tuple((int.from_bytes(digest), 2**_BITS - 1) for digest in digests)
     return ExactKernel(made, constants, tuple(quotients), Irrational(*_with_constants(tuple(nodes), symbols), instead))
+
+
+def _with_fractions(expression: Expr) -> Expr:
+    """Return an expression with fractions in place of floating-point numbers, which they equal exactly."""
+    from sympy import Float, Rational
+
+    return expression.xreplace({atom: Rational(atom) for atom in expression.atoms(Float)})
 
 
 def _with_constants(
@@ -153,12 +159,12 @@ class ExactMatrix:
 
 def exact_matrix(matrix: Matrix, parameter: Symbol, symbols: Sequence[Symbol]) -> ExactMatrix:
     """Return a matrix of rational functions of the parameter."""
-    from sympy import Float, Poly, Rational, cancel, fraction, together
+    from sympy import Poly, Rational, cancel, fraction, together
 
     found: list[Expr] = []
     lengths = []
     for entry in matrix:
-        exact = entry.xreplace({atom: Rational(atom) for atom in entry.atoms(Float)})
+        exact = _with_fractions(entry)
         top, bottom = exact, Rational(1)
         if not exact.is_polynomial(parameter):
             top, bottom = fraction(cancel(together(exact)))
