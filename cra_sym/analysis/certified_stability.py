@@ -32,8 +32,8 @@ def certify_stability(
     means that every motion is bounded: all multipliers lie inside the unit circle, or, without any damping, on it and
     apart from each other; a system that moves as a rigid body is therefore not stable. 'unstable' means that a
     multiplier lies outside. On a boundary, and where multipliers meet, a point is 'undecided'. The method is in
-    :mod:`cra_sym.solvers.proved_stability`: enclosures of the monodromy matrix
-    by Taylor series with bounds of the truncation and rounding errors, and of its multipliers by discs.
+    :mod:`cra_sym.solvers.proved_stability`: enclosures of the monodromy matrix by Taylor series with bounds of the
+    truncation and rounding errors, and of its multipliers by discs.
 
     Parameters
     ----------

@@ -76,7 +76,7 @@ def static_terms(system: System, excitation: Fluctuation, modes: int) -> tuple[A
     -------
     coupling : ndarray, shape (..., springs, modes, modes)
     compliance : ndarray, shape (..., springs)
-        P_r and lambda_r of :mod:`cra_sym.solvers.floquet`.
+        The K_r and lambda_r of :mod:`cra_sym.solvers.periodic`.
     """
     b = excitation.spring_displacements(system, modes)
     remaining, _ = moments_of_other_modes(system, excitation, modes)

@@ -15,7 +15,7 @@ def hill_exponents(
     r"""Return all Floquet exponents of :math:`\ddot q + 2C\dot q + (\Omega^2 + \epsilon\cos\varpi t\,P)\,q = 0`.
 
     With :math:`q = e^{st}\sum_k c_k e^{ik\varpi t}` the zeros s of Hill's determinant are the eigenvalues of a banded
-    matrix. It is independent of the integration in :mod:`cra_sym.solvers.floquet`, so that each checks the other.
+    matrix. It is independent of the integration in :mod:`cra_sym.solvers.periodic`, so that each checks the other.
 
     Parameters
     ----------

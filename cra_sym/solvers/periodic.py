@@ -3,8 +3,9 @@ r"""Monodromy matrices of any equations of second order with periodic coefficien
 .. math:: \frac{d}{dt}\Bigl(\dot q + \sum_r g_r (M_r\dot q + B_r q)\Bigr) + \Bigl(C + \sum_r g_r C_r\Bigr)\dot q
           + \Bigl(K + \sum_r g_r K_r\Bigr) q = 0
 
-with :math:`g_r` epsilon times a cosine or sine of a multiple of :math:`\varpi t`. The state is q and the momentum p
-under the derivative by time. The method is that of :mod:`cra_sym.solvers.taylor`.
+with :math:`g_r = s_r / (1 + \lambda_r s_r)` and :math:`s_r` epsilon times a cosine or sine of a multiple of
+:math:`\varpi t`; :math:`\lambda_r` is nonzero only for the static correction of omitted modes. The state is q and the
+momentum p under the derivative by time. The method is that of :mod:`cra_sym.solvers.taylor`.
 """
 
 from __future__ import annotations
@@ -88,12 +89,12 @@ def _maps(system: PeriodicSystem, tolerance: float, loop: Loop | None) -> _Maps:
     measures = np.array([np.log(angle), _SWUNG * np.log(swung)])
     blocks = _alike(np.arange(points), measures, max(1, 2 * _STATES // size**2)) if points else []
     series = _majorants(system, rate, blocks).T if points else ()
-    operations = Operations(system) if loop is not None and points else None
+    operations = Operations(system, loop) if loop is not None and points else None
     half = parity is not None
     for block, logs in zip(blocks, series, strict=True):
         steps, order = _cheapest(logs, tolerance)
-        if operations is not None and loop is not None:
-            out[block] = operations.maps(block, rate[block], steps, order, tolerance, half=half, loop=loop)
+        if operations is not None:
+            out[block] = operations.maps(block, rate[block], steps, order, tolerance, half=half)
             continue
         states = propagated(system.take(block), steps, order, half=half, tolerance=tolerance, factored=True)
         with np.errstate(over="ignore", invalid="ignore"):
@@ -218,14 +219,14 @@ class _Growth(NamedTuple):
 
 
 def _growth(system: PeriodicSystem, tolerance: float, loop: Loop | None) -> _Growth:
-    symmetric = system.conservative or system.reversible
-    if symmetric and not (system.conservative and system.parity() is not None):
+    conservative = system.conservative
+    if conservative and system.parity() is not None:
+        found = _maps(system, tolerance, loop)
+        return _Growth(paired_exponents(found.canonical(), system.period), found.maps, None)
+    if conservative or system.reversible:
         tolerance = min(tolerance, _SHARP)
         return _Growth(None, _maps(system, tolerance, loop).whole(), _DOUBT * tolerance)
-    found = _maps(system, tolerance, loop)
-    if not symmetric:
-        return _Growth(None, found.whole(), None)
-    return _Growth(paired_exponents(found.canonical(), system.period), found.maps, None)
+    return _Growth(None, _maps(system, tolerance, loop).whole(), None)
 
 
 def growth_rate(*given: Any, tolerance: float = 1e-10, loop: Loop | None = None) -> Array:

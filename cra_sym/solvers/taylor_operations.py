@@ -89,8 +89,8 @@ class Loop(Protocol):
 class Operations:
     """The operations of a batch of systems."""
 
-    def __init__(self, system: PeriodicSystem) -> None:
-        self.system, self.size = system, len(system.stiffness)
+    def __init__(self, system: PeriodicSystem, loop: Loop) -> None:
+        self.system, self.loop, self.size = system, loop, len(system.stiffness)
         n = self.size
         momenta = [factors(s.momentum, s.mass) for s in system.swings]
         forces = [factors(s.stiffness, s.damping) for s in system.swings]
@@ -156,7 +156,7 @@ class Operations:
             self.sums += count
 
     def maps(
-        self, index: NDArray[np.intp], rate: Array, steps: int, order: int, tolerance: float, *, half: bool, loop: Loop
+        self, index: NDArray[np.intp], rate: Array, steps: int, order: int, tolerance: float, *, half: bool
     ) -> Array:
         """Return the maps of some of the systems over a period, or over half of it, shape (points, 2N, 2N)."""
         system, number = self.system.take(index), steps // 2 if half else steps
@@ -164,7 +164,7 @@ class Operations:
         total: Array | None = None
         for start in range(0, number, most):
             some = range(start, min(start + most, number))
-            found = self._propagated(system, index, rate, some, steps, order, tolerance, loop)
+            found = self._propagated(system, index, rate, some, steps, order, tolerance)
             total = found if total is None else found @ total
         assert total is not None
         return total
@@ -178,7 +178,6 @@ class Operations:
         steps: int,
         order: int,
         tolerance: float,
-        loop: Loop,
     ) -> Array:
         """Return the maps over some of the steps of a period."""
         waves = np.zeros((len(some), len(system.swings), order))
@@ -201,7 +200,7 @@ class Operations:
         kinds, targets, swings = np.array(self.operations, dtype=np.int64).reshape(-1, 3).T.copy()
         numbers = 2 * self.size * (self.kept + order * self.rows)
         out = np.empty((index.size, 2 * self.size, 2 * self.size))
-        loop(
+        self.loop(
             kinds,
             targets,
             np.array(self.starts, dtype=np.int64),
